@@ -11,6 +11,7 @@
 use crate::attribution::beside::{NEEDED, ask, left_of, with_rests};
 use crate::attribution::conclude::{Errors, drowned, is_nothing, quoted, untenable};
 use crate::attribution::moment::lasts;
+use crate::attribution::places::{MOST_EFFECTS, may_join, of_this_rig};
 use crate::attribution::revise::revise;
 use crate::attribution::rivals::{Rival, UNEXPLAINED, drop_name, list_nearest, probabilities, rivals_of, sorted};
 use crate::attribution::suspects::{nearest, stand_beside, suspects};
@@ -20,7 +21,7 @@ pub(crate) use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::acquisition::sample_hold::{self, SampleHold};
 use crate::effects::placed::Placed;
 use crate::effects::placed::is_named;
-use crate::effects::{self, Effect, Estimate, Instance, Shape};
+use crate::effects::{self, Effect, Estimate, Instance};
 use crate::fit::heldout::{self, Around, Held};
 use crate::fit::search::{base, between_starts, connected, refine, refine_newest, scan, stride};
 use crate::fit::{Fit, Rows, TargetFit, fit, plausible, scatters};
@@ -31,10 +32,6 @@ use crate::signal::residual::whiteness;
 use crate::verdict::Kin;
 use std::collections::BTreeSet;
 
-/// Most effects on one channel, beside what every rig has.
-const MOST_ON_A_CHANNEL: usize = 3;
-/// Most effects in one hypothesis, over all channels, beside what every rig has.
-const MOST_EFFECTS: usize = 6;
 /// Share of the work that the rounds of the search are told to be at the most.
 const LATE: f64 = 0.95;
 /// Share of the held-out error on its first channel that an effect must remove to be worth a name.
@@ -413,47 +410,6 @@ pub(crate) fn offers(context: &Context) -> Vec<Scanned> {
         .collect()
 }
 
-/// Whether an instance may join: not twice the same effect on a channel, not too many effects on one channel.
-pub(crate) fn may_join(context: &Context, placed: &[Placed], effect: &dyn Effect, instance: &Instance) -> bool {
-    instance.channels.iter().all(|c| {
-        let there: Vec<&Placed> = placed.iter().filter(|p| p.instance.touches(c)).collect();
-        // what is older than the run may have happened once more
-        let older = |p: &Placed| {
-            p.instance.form != instance.form && [&p.instance.form, &instance.form].iter().any(|f| *f == effects::BEFORE)
-        };
-        let apart = |p: &&Placed| {
-            (p.effect.id() != effect.id() || older(p))
-                && !p.effect.never_beside().contains(&effect.id())
-                && !effect.never_beside().contains(&p.effect.id())
-                && !(effect.follows_supply(instance, c) && p.effect.follows_supply(&p.instance, c))
-        };
-        let room = effect.is_of_every_rig() || there.iter().filter(|p| takes_a_place(context, p)).count() < MOST_ON_A_CHANNEL;
-        room && there.iter().all(apart)
-    })
-}
-
-/// How many effects there are beside what every rig has.
-fn of_this_rig(context: &Context, placed: &[Placed]) -> usize {
-    placed.iter().filter(|p| takes_a_place(context, p)).count()
-}
-
-/// Whether a name is one of the few that a run or a channel may have. What every rig and every logger has, what single rows hold, and what the
-/// readings show by themselves is told besides.
-fn takes_a_place(context: &Context, placed: &Placed) -> bool {
-    let (effect, instance) = (placed.effect, &placed.instance);
-    if effect.is_of_every_rig() || effect.is_of_moments(instance) || placed.is_read_off() {
-        return false;
-    }
-    let of = |(shape, value): (Shape, &f64)| Estimate {
-        name: shape.name.into(),
-        unit: shape.unit.into(),
-        value: *value,
-        se: f64::NAN,
-    };
-    let shapes: Vec<Estimate> = effect.shapes(context, instance).into_iter().zip(&placed.shape).map(of).collect();
-    effect.kin(context, instance, &shapes) == Kin::Own
-}
-
 /// Scans the grids of some offers beside what is there already, on all cores, each with what it remembers of the rows.
 fn scan_all(context: &Context, declared: Declared<'_>, (placed, loud): (&[Placed], &[bool]), mut due: Vec<&mut &mut Scanned>) {
     let shares = cores().min(due.len());
@@ -779,39 +735,4 @@ pub(crate) fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, 
     placed.remove(k);
     let placed = refine(context, declared, &placed, Rows::All, 60);
     fit(context, declared, &placed, Some(start), Rows::All)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::effects::library;
-    use crate::log::{Column, Log};
-
-    /// A filter of half a row is what every logger has; one of ten rows is this one's own, and single absurd rows are no cause.
-    #[test]
-    fn what_every_logger_has_takes_no_place() {
-        let t: Vec<f64> = (0..40).map(|i| 0.1 * f64::from(i)).collect();
-        let columns = vec![
-            Column { name: "rpm".into(), values: (0..40).map(|i| 100.0 * f64::from(i)).collect() },
-            Column { name: "thrust_n".into(), values: (0..40).map(|i| 0.1 * f64::from(i)).collect() },
-        ];
-        let context = Context::new(&Log { t, columns, ..Log::default() }, Some(1000.0));
-        let takes = |id: &str, form: &str, shape: &[f64]| {
-            let effect = *library().iter().find(|e| e.id() == id).expect("in the library");
-            takes_a_place(&context, &Placed { effect, instance: Instance::new(&["thrust_n"], form), shape: shape.to_vec() })
-        };
-        assert!(!takes("channel_filter", "first_order", &[0.04]) && takes("channel_filter", "first_order", &[1.0]));
-        // a current that follows its voltage by one name does not follow it by another
-        let placed = |id: &str, channels: &[&str], form: &str| {
-            let effect = *library().iter().find(|e| e.id() == id).expect("in the library");
-            Placed { effect, instance: Instance::new(channels, form), shape: vec![0.7, 12.0] }
-        };
-        let lead = [placed("supply_sag", &["voltage_v", "current_a"], "same_power")];
-        let joins = |channels: &[&str]| {
-            let battery = placed("battery_discharge", channels, "straight");
-            may_join(&context, &lead, battery.effect, &battery.instance)
-        };
-        assert!(joins(&["voltage_v"]) && !joins(&["voltage_v", "current_a", "rpm"]));
-        assert!(!takes("glitch_rows", "", &[]) && takes("zero_drift", "", &[]));
-    }
 }

@@ -10,8 +10,9 @@
 
 use crate::attribution::conclude::{Errors, harmful};
 use crate::attribution::diagnose::{
-    Candidate, Diagnosis, NEEDED_EVIDENCE, diagnose, may_join, net_gain, offers, shares, without, worth_a_name,
+    Candidate, Diagnosis, NEEDED_EVIDENCE, diagnose, net_gain, offers, shares, without, worth_a_name,
 };
+use crate::attribution::places::may_join;
 use crate::channel::{Context, Target};
 use crate::effects::Estimate;
 use crate::effects::placed::Placed;

@@ -16,6 +16,7 @@ pub mod diagnose;
 pub mod long;
 pub(crate) mod moment;
 pub(crate) mod opponent;
+pub(crate) mod places;
 pub(crate) mod revise;
 pub mod rivals;
 pub(crate) mod split;

@@ -7,7 +7,8 @@
 //! Units: evidence in nats.
 //! Reference: stepwise regression with exchange, Miller 2002, Subset Selection in Regression, section 3.6.
 
-use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, evidence_over, may_join, offers, round_of};
+use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, evidence_over, offers, round_of};
+use crate::attribution::places::may_join;
 use crate::attribution::rivals::probabilities;
 use crate::attribution::split::split;
 use crate::channel::Context;

@@ -32,7 +32,7 @@ impl Context {
 
     /// Share of the fluctuations of the speed within a level that no load follows; 0 where the loads do not tell.
     pub(crate) fn sensor_share(&self) -> f64 {
-        if self.consensus.channels.len() != 1 || self.time_is_row || self.is_table() {
+        if !self.has_lone_sensor() || self.time_is_row || self.is_table() {
             return 0.0;
         }
         let speed = self.about_levels(&self.rpm);
@@ -42,15 +42,20 @@ impl Context {
         if shares.is_empty() { 0.0 } else { 1.0 - shares.into_iter().fold(alike(&speed), f64::max).min(1.0) }
     }
 
-    /// Takes a share of each row's distance from the course of its level off the speed.
+    /// Whether one sensor alone reads the speed.
+    fn has_lone_sensor(&self) -> bool {
+        self.consensus.channels.len() == 1
+    }
+
+    /// Takes a share of each row's distance from the course of its level off the speed of a lone sensor.
     pub(crate) fn steady_speed(&mut self, share: f64) {
-        if share > 0.0 && !self.rpm.is_empty() {
+        if share > 0.0 && self.has_lone_sensor() {
             let about = self.about_levels(&self.rpm);
             self.rpm.iter_mut().zip(about).filter(|(_, about)| about.is_finite()).for_each(|(rpm, about)| *rpm -= share * about);
             self.powers = Default::default();
             self.facts = Default::default();
+            self.consensus.sensor_share = share;
         }
-        self.consensus.sensor_share = share;
     }
 
     /// What values are off the course of their level; not a number elsewhere, and where a level is too short to tell.

@@ -87,7 +87,7 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
         left_out: Vec::new(),
         set_aside: Vec::new(),
         at_rest: runs.iter().all(|r| r.closed.verdict.at_rest),
-        sensor_share: runs.iter().filter_map(|r| r.closed.verdict.sensor_share).reduce(f64::max),
+        sensor_share: Some(models[1].sensor_share).filter(|share| *share > 0.0),
         guessed_floors: runs.iter().filter_map(|r| r.closed.verdict.guessed_floors).max(),
         validation: Vec::new(),
         runs: runs.iter().enumerate().map(|(k, run)| of_run(run, k, compared, &silent)).collect(),
