@@ -130,7 +130,7 @@ mod tests {
         };
         let rows = 0..2400;
         let pulse: Vec<f64> = rows.clone().map(|k| 1200.0 + 100.0 * (k / 80 % 7) as f64).collect();
-        let truth: Vec<f64> = rows.clone().map(|k| 6.0 * (pulse[k] - 1000.0) + real * noise(k, 0)).collect();
+        let truth: Vec<f64> = rows.clone().map(|k| 12.0 * (pulse[k] - 1000.0) + real * noise(k, 0)).collect();
         let rpm = rows.clone().map(|k| truth[k] + error * noise(k, 1)).collect();
         let thrust = rows.clone().map(|k| 2e-7 * truth[k].powi(2) + 0.004 * noise(k, 2)).collect();
         let columns = [("pulse_us", pulse), ("rpm", rpm), ("thrust_n", thrust)];
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn what_the_thrust_follows_is_real_and_what_it_does_not_is_the_sensor_s() {
-        for (real, error, share) in [(30.0, 0.0, 0.0), (0.0, 30.0, 1.0), (30.0, 30.0, 0.5)] {
+        for (real, error, share) in [(15.0, 0.0, 0.0), (0.0, 15.0, 1.0), (15.0, 15.0, 0.5)] {
             let (context, _) = context(real, error);
             let found = context.sensor_share();
             assert!((found - share).abs() < 0.1, "{found} for {share}");
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_sensor_s_own_error_is_taken_off_the_speed() {
-        let (mut context, truth) = context(0.0, 30.0);
+        let (mut context, truth) = context(0.0, 15.0);
         let off = |context: &Context| {
             let square: f64 = context.rpm.iter().zip(&truth).map(|(rpm, truth)| (rpm - truth).powi(2)).sum();
             (square / truth.len() as f64).sqrt()
