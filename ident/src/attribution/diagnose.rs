@@ -502,17 +502,26 @@ pub(crate) fn round_of(
     out
 }
 
+/// The effect that a candidate adds.
+pub(crate) fn newest(candidate: &Candidate) -> Option<&Placed> {
+    candidate.fit.placed.last()
+}
+
+/// Whether an effect is the other one in the same form on fewer channels, none of them another.
+pub(crate) fn is_part_of(part: Option<&Placed>, whole: Option<&Placed>) -> bool {
+    let (Some(part), Some(whole)) = (part, whole) else { return false };
+    let fewer = part.instance.channels.len() < whole.instance.channels.len();
+    let same = part.effect.id() == whole.effect.id() && part.instance.form == whole.instance.form;
+    same && fewer && part.instance.channels.iter().all(|c| whole.instance.touches(c))
+}
+
 /// Puts an instance before one of the same effect on more channels that brings less than a name needs beyond it: a name claims no channel that does
 /// not show it.
 fn on_fewer_channels(candidates: &mut [Candidate]) {
-    let is_part = |of: &Candidate, whole: &Candidate| {
-        let (Some(part), Some(all)) = (of.fit.placed.last(), whole.fit.placed.last()) else { return false };
-        let fewer = part.instance.channels.len() < all.instance.channels.len();
-        let same = part.effect.id() == all.effect.id() && part.instance.form == all.instance.form;
-        same && fewer && part.instance.channels.iter().all(|c| all.instance.touches(c))
-    };
     for k in 0..candidates.len() {
-        let stands_first = |c: &Candidate| is_part(c, &candidates[k]) && c.evidence > candidates[k].evidence - NEEDED_EVIDENCE;
+        let stands_first = |c: &Candidate| {
+            is_part_of(newest(c), newest(&candidates[k])) && c.evidence > candidates[k].evidence - NEEDED_EVIDENCE
+        };
         if let Some(j) = (k + 1..candidates.len()).find(|j| stands_first(&candidates[*j])) {
             candidates[k..=j].rotate_right(1);
         }

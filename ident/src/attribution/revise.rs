@@ -7,7 +7,9 @@
 //! Units: evidence in nats.
 //! Reference: stepwise regression with exchange, Miller 2002, Subset Selection in Regression, section 3.6.
 
-use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, evidence_over, offers, round_of};
+use crate::attribution::diagnose::{
+    Candidate, NEEDED_EVIDENCE, REFINED, Scanned, evidence_over, is_part_of, newest, offers, round_of,
+};
 use crate::attribution::places::may_join;
 use crate::attribution::rivals::probabilities;
 use crate::attribution::split::split;
@@ -58,7 +60,14 @@ pub(crate) fn revise(
         let own =
             ranked.iter().position(|c| is_as(c, in_place_now)).or_else(|| ranked.iter().position(|c| newest_is(c, in_place_now)));
         let standing = own.map_or(f64::NEG_INFINITY, |o| ranked[o].evidence);
-        let clearly = |c: &Candidate| c.evidence > standing + CLEARLY_BETTER && c.evidence > NEEDED_EVIDENCE;
+        // a name claims no channel that does not show it
+        let needed = |c: &Candidate| match (is_part_of(newest(c), Some(in_place_now)), is_part_of(Some(in_place_now), newest(c)))
+        {
+            (true, _) => -NEEDED_EVIDENCE,
+            (_, true) => NEEDED_EVIDENCE,
+            _ => CLEARLY_BETTER,
+        };
+        let clearly = |c: &Candidate| c.evidence > standing + needed(c) && c.evidence > NEEDED_EVIDENCE;
         // the ranking asks first what the noise's own colour speaks for: more evidence may stand behind
         let better = ranked.iter().position(|c| clearly(c) && predicts_as_well(context, declared, folds, &c.fit, &best.fit));
         let Some(winner) = better.or(own).filter(|w| ranked[*w].evidence > NEEDED_EVIDENCE) else {
