@@ -110,7 +110,7 @@ fn cases() -> Vec<(Verdict, bool, &'static [&'static str], &'static [&'static st
             with_left(verdict(Kind::Attributed, vec![filter(0.7)])),
             true,
             &[
-                "New since the declared model: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.0304 N rms is left (slow).",
+                "New since the declared model, on top of what it has: the load cell probably reads the mean of its last 0.50 s. That explains 99 % of what thrust had left over. On thrust 0.0304 N rms is left (slow).",
             ],
             &["noise."],
         ),
@@ -888,4 +888,20 @@ fn all_is_what_stood_above_the_noise_floor() {
     }
     let said = sentence(&v, Vocabulary::RIG, false);
     assert!(said.contains("That explains all of what thrust had left above its noise floor."), "{said}");
+}
+
+/// A lead acts on speed, current and voltage: the reader looks at the voltage first.
+#[test]
+fn a_share_is_told_of_every_quantity_that_was_plain() {
+    let mut of = verdict(Kind::Attributed, vec![sag(0.95)]);
+    of.effects[0].channels = vec!["thrust_n".into(), "voltage_v".into()];
+    let said = sentence(&of, Vocabulary::RIG, false);
+    assert!(said.contains("of what thrust and voltage had left over"), "{said}");
+    // two floors were nothing to look at
+    if let Some(c) = of.channels.predicted.get_mut("voltage_v") {
+        c.before.heldout_rms = 0.02;
+        c.after.heldout_rms = 0.01;
+    }
+    let said = sentence(&of, Vocabulary::RIG, false);
+    assert!(said.contains("of what thrust had left over"), "{said}");
 }

@@ -25,7 +25,7 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str, raw: b
     let text = |s: &str| toml::Value::String(s.to_owned());
     log.meta.insert("motor".into(), text(&scenario.motor));
     log.meta.insert("propeller".into(), text(&scenario.propeller));
-    log.meta.insert("supply".into(), text(&supply(scenario.supply)));
+    log.meta.insert("supply".into(), text(&supply(scenario)));
     // a run that is computed has no day, and the same seed gives the same bytes on every one
     log.meta.insert("date".into(), text(SIMULATED));
     // what a laboratory reads off its barometer before the run
@@ -79,9 +79,12 @@ pub(crate) fn to_log(scenario: &Scenario, record: &RunRecord, name: &str, raw: b
 /// What stands in the place of the day of a run that nobody made.
 pub(crate) const SIMULATED: &str = "simulated";
 
-/// What feeds a simulated rig, as an operator would write it down.
-fn supply(of: SupplySection) -> String {
-    match of {
+/// What feeds a simulated rig, as an operator would write it down: a hidden battery is plain to see, and what is left in it is not.
+fn supply(of: &Scenario) -> String {
+    if of.effects.iter().any(|e| e.effect.id() == "battery_discharge") {
+        return "lithium battery".to_owned();
+    }
+    match of.supply {
         SupplySection::Bench { voltage_v } => format!("bench supply, {voltage_v} V"),
         SupplySection::Lipo { cells, capacity_ah, .. } => format!("{cells}S lithium battery, {capacity_ah} A.h"),
     }

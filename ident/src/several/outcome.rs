@@ -21,7 +21,7 @@ use crate::log::sparse;
 use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors, stood};
 use crate::numeric::order::median;
 use crate::numeric::parallel::in_parallel;
-use crate::signal::bad;
+use crate::signal::{bad, start};
 use crate::verdict::Verdict;
 use crate::verdict::words::parameter_of;
 use crate::verdict::words::{DISAGREE, OTHERWISE, digits};
@@ -106,7 +106,7 @@ fn shown_without(tenable: &Tenable<'_>, k: usize, without: &[Across], quoted: &s
 /// Closes the loop on several runs of one rig.
 #[must_use]
 pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> Outcome {
-    let start = start_pulse(runs);
+    let start = start_pulse(runs.iter().map(|r| &r.closed.context));
     let share = median(&mut runs.iter().map(|r| r.closed.context.consensus.sensor_share).collect::<Vec<f64>>());
     let contexts: Vec<Context> = runs.iter().map(|run| prepared(&run.log, (start, share))).collect();
     let mut members: Vec<Member<'_>> = runs.iter().zip(&contexts).map(|(run, c)| Member::of(&run.closed, c, &contexts)).collect();
@@ -156,8 +156,18 @@ fn declared(runs: &[Run], contexts: &[Context], members: &[Member<'_>]) -> Model
     Model { sensor_share: 0.0, ..model(runs, contexts, &shared, &[], &[], own) }
 }
 
-fn start_pulse(runs: &[Run]) -> f64 {
-    median(&mut runs.iter().map(|r| r.closed.context.start_pulse_us).collect::<Vec<f64>>())
+/// The pulse at which the rig's motor starts: between the highest at which it stands on any run and the lowest at which it turns. Each run by itself
+/// tells it no finer than its own levels lie.
+fn start_pulse<'c>(runs: impl Iterator<Item = &'c Context>) -> f64 {
+    let (mut t, mut pulse, mut rpm) = (Vec::new(), Vec::new(), Vec::new());
+    for context in runs {
+        let Some(own) = context.pulse.as_ref().filter(|p| p.len() == context.rpm.len()) else { continue };
+        let shift = t.last().copied().unwrap_or(0.0) - context.t.first().copied().unwrap_or(0.0);
+        t.extend(context.t.iter().map(|t| t + shift));
+        pulse.extend_from_slice(own);
+        rpm.extend_from_slice(&context.rpm);
+    }
+    start::start_pulse(&t, (!pulse.is_empty()).then_some(&*pulse), &rpm)
 }
 
 fn prepared(log: &Log, (start, share): (f64, f64)) -> Context {
@@ -266,4 +276,28 @@ fn mean_and_spread(zeros: &[f64]) -> (f64, f64) {
     let mean = zeros.iter().sum::<f64>() / n;
     let square = zeros.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
     (mean, (square / n).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Column;
+
+    /// A rotor that stands below 1080 us, six seconds at each level.
+    fn run(levels: &[f64]) -> Context {
+        let pulse: Vec<f64> = levels.iter().flat_map(|p| [*p; 60]).collect();
+        let rpm = pulse.iter().map(|p| if *p > 1080.0 { 8.0 * (p - 1000.0) } else { 0.0 }).collect();
+        let t = (0..pulse.len()).map(|i| 0.1 * i as f64).collect();
+        let columns = [("pulse_us", pulse), ("rpm", rpm)];
+        let columns = columns.map(|(name, values)| Column { name: name.to_owned(), values }).to_vec();
+        Context::new(&Log { t, columns, ..Log::default() }, None)
+    }
+
+    #[test]
+    fn the_start_lies_between_what_stands_and_what_turns_on_any_run() {
+        let [coarse, fine] = [run(&[1000.0, 1100.0, 1400.0]), run(&[1000.0, 1050.0, 1200.0, 1500.0])];
+        assert_eq!((coarse.start_pulse_us, fine.start_pulse_us), (1050.0, 1125.0));
+        assert_eq!(start_pulse([&coarse, &fine].into_iter()), 1075.0);
+        assert_eq!(start_pulse([&fine, &coarse, &coarse].into_iter()), 1075.0);
+    }
 }

@@ -369,7 +369,14 @@ fn none(verdict: &Verdict, news: bool) -> String {
 
 /// What was found; against a declared model it is new since then.
 fn since(news: bool, found: &str) -> String {
-    if news { format!("New since the declared model: {found}") } else { upper(found) }
+    match news {
+        // a size is told as if it were the whole
+        true if found.contains(|c: char| c.is_ascii_digit()) => {
+            format!("New since the declared model, on top of what it has: {found}")
+        }
+        true => format!("New since the declared model: {found}"),
+        false => upper(found),
+    }
 }
 
 /// Clauses as one sentence.
@@ -423,10 +430,17 @@ struct Explained {
     says_more: bool,
 }
 
-/// How much the effects explain of what their first channels had left over; nothing where that is not worth a figure. `open`: which of
-/// them are there is a question.
+/// Whether what a whole had left over was plain to see, and most of it is gone.
+fn was_plain_and_is_gone(verdict: &Verdict, name: &str) -> bool {
+    let floors = verdict.channels.get(name).map_or(0.0, |c| c.before.heldout_rms / c.noise_floor_rms);
+    floors > LOUD && share(verdict, name).is_some_and(|s| s > HALF)
+}
+
+/// How much the effects explain of what their first channels had left over, and the others on which most is gone; nothing where that is not worth
+/// a figure. `open`: which of them are there is a question.
 fn explained(verdict: &Verdict, told: &[&EffectEntry], open: bool) -> Option<Explained> {
-    let mut on: Vec<&str> = told.iter().filter_map(|e| e.channels.first()).map(String::as_str).collect();
+    let further = told.iter().flat_map(|e| e.channels.iter().skip(1)).filter(|c| was_plain_and_is_gone(verdict, c));
+    let mut on: Vec<&str> = told.iter().filter_map(|e| e.channels.first()).chain(further).map(String::as_str).collect();
     on.sort_unstable();
     on.dedup_by_key(|c| whole(verdict, c));
     let told_of = |c| Some((c, share(verdict, c).filter(|s| *s >= TELLING)?));
