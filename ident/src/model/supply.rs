@@ -13,7 +13,7 @@ use super::read::{Refusal, finite, refusal};
 use super::{AddedEffect, Model, load_unit};
 use crate::channel::{Context, Relation, Target};
 use crate::effects::placed::Placed;
-use crate::effects::supply::supply_voltage::{OF_CURRENT, OF_SPEED, at_throttle};
+use crate::effects::supply::supply_voltage::{OF_CURRENT, OF_SPEED};
 use crate::model::leftover::{along, binned};
 use crate::numeric::digits;
 use crate::numeric::order::median;
@@ -37,10 +37,10 @@ struct Level {
     se: f64,
 }
 
-/// Power of the voltage that a relation goes with at a share of the throttle; `None` of one that does not follow the supply.
-fn power(relation: Relation, throttle: f64) -> Option<f64> {
+/// Power of the voltage that a relation goes with; `None` of one that does not follow the supply.
+fn power(relation: Relation) -> Option<f64> {
     match relation {
-        Relation::SpeedFromPulse => Some(at_throttle(OF_SPEED.0, throttle)),
+        Relation::SpeedFromPulse => Some(OF_SPEED.0),
         Relation::Current => Some(-OF_CURRENT.0),
         _ => None,
     }
@@ -80,7 +80,7 @@ impl Model {
     #[must_use]
     pub fn supplied_by(mut self, context: &Context) -> Self {
         let of_target = |target: &Target| {
-            power(target.relation, 1.0)?;
+            power(target.relation)?;
             let mut volts = self.follows_by_itself(target).then(|| readings(context))??;
             self.less_what_it_says(context, target, &mut volts)?;
             let levels = levels(&volts, &context.regressor(target.relation)?);
@@ -95,9 +95,7 @@ impl Model {
     pub(crate) fn said_of_the_supply(&self) -> Option<String> {
         let known = |name: &str| self.supply.iter().any(|(channel, _)| channel.starts_with(name));
         let parts = [
-            known("rpm").then(|| {
-                format!("the speed goes with the voltage to the power 1 at no throttle and {} at full throttle", OF_SPEED.0)
-            }),
+            known("rpm").then(|| format!("the speed goes with the voltage to the power {}", OF_SPEED.0)),
             known("current").then(|| format!("the current at a speed goes with it to the power -{}", OF_CURRENT.0)),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
@@ -109,7 +107,7 @@ impl Model {
     /// gave, or the channel does not follow it. What effects of the model make of the voltage is measured here, and left out.
     pub(super) fn predict_at_the_supply_of(&self, context: &Context, target: &Target) -> Option<Vec<f64>> {
         let (_, own) = self.supply.iter().find(|(channel, _)| channel == target.name)?;
-        let loads = context.regressor(target.relation)?;
+        let (power, loads) = (power(target.relation)?, context.regressor(target.relation)?);
         // what a supply gives hangs on the command, also where it cannot give what the motor asks for
         let commands = context.regressor(Relation::SpeedFromPulse).unwrap_or_else(|| loads.clone());
         // as many times the voltage of the model's own run at the same load, where both have settled: a rotor on its way is at another load
@@ -123,7 +121,7 @@ impl Model {
             let (times, se) = ((along(&settled, commands[row]) + trend[row]).max(LEAST), along(&errors, commands[row]));
             let (apart, open) = (times.ln(), 2.0 * (se / times).powi(2));
             // two supplies that only the noise of their meters tells apart are one
-            *p *= (power(target.relation, commands[row])? * apart.powi(3) / (apart * apart + open).max(f64::MIN_POSITIVE)).exp();
+            *p *= (power * apart.powi(3) / (apart * apart + open).max(f64::MIN_POSITIVE)).exp();
         }
         Some(out)
     }

@@ -120,7 +120,7 @@ impl Effect for SupplySag {
         }
         if instance.form == SAME_POWER && design.relation == Relation::Current {
             if let [exponent, reference] = shape {
-                supply_voltage::scale(context, |_| -exponent, *reference, design);
+                supply_voltage::scale(context, -exponent, *reference, design);
             }
             return;
         }

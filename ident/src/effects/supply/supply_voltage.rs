@@ -20,8 +20,8 @@ pub(crate) struct SupplyVoltage;
 const LEAST_SPREAD: f64 = 0.005;
 /// Exponents that a motor can have, of the speed, and of the current with its sign turned.
 const EXPONENTS: (f64, f64) = (0.05, 2.0);
-/// What is known of the exponent of the speed at full throttle before any run: one over one and the share of the voltage that the winding takes, a
-/// quarter of what is left for the speed. Mean and standard deviation.
+/// What is known of the exponent of the speed before any run: one over one and the share of the voltage that the winding takes, a fifth of it
+/// at full speed and next to none of it at the lowest. Mean and standard deviation.
 pub(crate) const OF_SPEED: (f64, f64) = (0.8, 0.1);
 /// The same of the current at a speed: one for the same power, less where switching loses more at a higher voltage. On 56 pairs of runs at 7 and
 /// 11 V (fivein-static-tables, MIT 2018, Cao and Strawson) it is 0.70, and from motor to motor 0.1 about that.
@@ -42,7 +42,7 @@ impl Effect for SupplyVoltage {
     fn about(&self) -> About {
         About {
             title: "Speed or current follows the supply's voltage",
-            equation: "rpm *= (voltage_v / reference)^e, e = 1 / (1 + (1 / exponent - 1) throttle), throttle = (pulse_us - 1000) / 1000; current_a *= (voltage_v / reference)^-exponent",
+            equation: "rpm *= (voltage_v / reference)^exponent; current_a *= (voltage_v / reference)^-exponent",
             source: "brushless motor at a fixed duty, V = k omega + R I",
             depends_on: &["voltage_v"],
             signature: "at another supply voltage the speed for the same pulse, and the current at the same speed, are others",
@@ -109,11 +109,8 @@ impl Effect for SupplyVoltage {
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], _: usize, design: &mut TargetDesign) {
         let [exponent, reference] = shape else { return };
-        if instance.form == CURRENT {
-            scale(context, |_| -exponent, *reference, design);
-        } else if let Some(pulse) = &context.pulse {
-            scale(context, |row| at_throttle(*exponent, (pulse[row] - 1000.0) / 1000.0), *reference, design);
-        }
+        let exponent = if instance.form == CURRENT { -exponent } else { *exponent };
+        scale(context, exponent, *reference, design);
     }
 
     /// The reference is no finding.
@@ -144,17 +141,10 @@ pub(crate) fn log_prior((mean, sd): (f64, f64), shape: &[f64]) -> f64 {
     shape.first().map_or(0.0, |exponent| -0.5 * ((exponent - mean) / sd).powi(2))
 }
 
-/// Exponent of the speed at a share of the throttle, of that at full throttle: the winding takes the current's share of the voltage, which grows as
-/// the speed does.
-pub(crate) fn at_throttle(full: f64, throttle: f64) -> f64 {
-    1.0 / (1.0 + (1.0 / full - 1.0) * throttle.clamp(0.0, 1.0))
-}
-
-/// Scales a design by a power of the measured voltage over the reference, row by row.
-pub(crate) fn scale(context: &Context, power: impl Fn(usize) -> f64, reference: f64, design: &mut TargetDesign) {
+/// Scales a design by a power of the measured voltage over the reference.
+pub(crate) fn scale(context: &Context, power: f64, reference: f64, design: &mut TargetDesign) {
     let Some(voltage) = &context.voltage else { return };
-    let of = |(row, v): (usize, &f64)| (v / reference).max(0.1).powf(power(row));
-    design.scale(&voltage.iter().enumerate().map(of).collect::<Vec<f64>>());
+    design.scale(&voltage.iter().map(|v| (v / reference).max(0.1).powf(power)).collect::<Vec<f64>>());
 }
 
 /// Form of the current.
