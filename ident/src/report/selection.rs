@@ -119,7 +119,7 @@ fn at_full_throttle(row: &Row) -> String {
 /// How long a pair lasts with some batteries, and what it lifts beyond the weight.
 fn lasts(row: &Row, with: &WithBatteries) -> String {
     format!(
-        "{} with {}: {:.1} min at full throttle, resultant force {} N, {:.2} N per A.",
+        "{}, {}: {:.1} min at full throttle, resultant force {} N, {:.2} N per A.",
         row.pair.name(),
         counted(with.batteries),
         with.full_throttle_min.0,
@@ -318,8 +318,8 @@ mod tests {
         assert!(sheet.drawn().is_empty() && !html.contains("<figure"), "{:?}", sheet.drawn());
         let only = rows.first().expect("a row");
         assert!(html.contains(&at_full_throttle(only)));
-        assert_eq!(html.matches(&format!("<p>{} with ", only.pair.name())).count(), 2, "1 battery, 2 batteries");
-        assert!(html.contains("with 1 battery: ") && html.contains("with 2 batteries: "));
+        assert_eq!(html.matches(&format!("<p>{}, ", only.pair.name())).count(), 2, "1 battery, 2 batteries");
+        assert!(html.contains(", 1 battery: ") && html.contains(", 2 batteries: "));
     }
 
     #[test]
