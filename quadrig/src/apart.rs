@@ -3,7 +3,8 @@
 //! What it is: every command names its files before it begins ([`Paths`]); an output in the place of an input, or of another output, is
 //! refused, and nothing has been read or written yet. So is an input that can be read only once, an output that is no regular file, and one that
 //! cannot be written: a file is made where it will be made, and is gone at once.
-//! What can go wrong: files that lie in the same place under two names (a link, `./`) are the same file.
+//! What can go wrong: files that lie in the same place under two names (a link of either kind, `./`) are the same file; hard links are told on Unix
+//! alone.
 //! Units: none.
 //! Reference: specification `formats.md`: no command writes over one of its own inputs.
 
@@ -163,7 +164,20 @@ fn takes_files(output: &Path, folder: &Path) -> Result<(), Failure> {
 }
 
 fn is_same(a: &Path, b: &Path) -> bool {
-    place(a).zip(place(b)).is_some_and(|(a, b)| a == b)
+    place(a).zip(place(b)).is_some_and(|(a, b)| a == b) || is_one_file(a, b)
+}
+
+/// Whether two names are hard links to one file.
+#[cfg(unix)]
+fn is_one_file(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let of = |path: &Path| std::fs::metadata(path).ok().map(|found| (found.dev(), found.ino()));
+    of(a).zip(of(b)).is_some_and(|(a, b)| a == b)
+}
+
+#[cfg(not(unix))]
+fn is_one_file(_: &Path, _: &Path) -> bool {
+    false
 }
 
 /// Where a path leads, links followed; the last parts need not be there yet.
@@ -250,6 +264,12 @@ mod tests {
         {
             std::os::unix::fs::symlink(&run, path("link.csv")).expect("a link");
             assert!(refusal(Paths::default().reads([&run]).writes("-o", [&path("link.csv")])).contains("is an input"));
+            fs::hard_link(&run, path("second.csv")).expect("a link");
+            let second = path("second.csv");
+            let said = refusal(Paths::default().reads([&run]).writes("-o", [&second]));
+            assert!(said.contains("second.csv: is an input of this command; expected another file for -o"), "{said}");
+            let twice = refusal(Paths::default().writes("-o", [&run]).writes("--truth", [&second]));
+            assert!(twice.contains("for -o and for --truth"), "{twice}");
         }
     }
 }

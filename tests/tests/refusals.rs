@@ -40,6 +40,20 @@ fn alone(name: &'static str, words: &'static str, said: &'static [&'static str])
     Case { name, file: None, words, said }
 }
 
+/// Refusals as docs/errors.md shows them: the name of a case, its call and what it prints, a line each.
+const EXAMPLES: &str = include_str!("refusals/examples.txt");
+
+/// What the page shows of a case, if it does.
+fn example(case: &Case) -> Option<(&'static str, &'static str)> {
+    let lines = |block: &'static str| {
+        let (name, rest) = block.split_once('\n')?;
+        let (call, printed) = rest.split_once('\n')?;
+        Some((name, call.strip_prefix("$ quadrig ")?, printed))
+    };
+    let mut all = EXAMPLES.trim_end().split("\n\n").map(|block| lines(block).expect("a name, a call and what it prints"));
+    all.find(|(name, ..)| *name == case.name).map(|(_, call, printed)| (call, printed))
+}
+
 /// Everything in a folder, with its bytes.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
@@ -155,6 +169,7 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
     let cases: Vec<Case> = logs.into_iter().chain(files).chain(commands).flatten().collect();
     assert!(cases.len() >= 330, "{} cases", cases.len());
     let mut wrong = Vec::new();
+    let mut shown = 0;
     for case in &cases {
         if let Some((file, bytes)) = &case.file {
             write(file, bytes);
@@ -168,6 +183,12 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
                 "{}: `quadrig {}`: status {:?}, lacks {lacks:?}\n  {}{}",
                 case.name, case.words, said.status, said.err, said.out
             ));
+        }
+        if let Some(example) = example(case) {
+            shown += 1;
+            if example != (case.words, said.err.trim_end()) {
+                wrong.push(format!("{}: docs/errors.md shows {example:?}, it is `{}`: {}", case.name, case.words, said.err));
+            }
         }
         for leaked in ["f64", "u32", "struct ", "enum ", "os error"] {
             if said.err.contains(leaked)
@@ -183,5 +204,6 @@ fn malformed_input_is_refused_in_one_line_that_teaches() {
             std::fs::remove_file(bench.path(file)).expect("it is there");
         }
     }
+    assert_eq!(shown, EXAMPLES.trim_end().split("\n\n").count(), "examples that are no case, or several");
     assert!(wrong.is_empty(), "{} of {} cases:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
 }

@@ -142,6 +142,16 @@ to try where it is not plain; exit status 1. Nothing is written then, and what w
 that is none, a word that an option does not take) is status 2, and `--help` says what there is.
 ";
 
+/// Calls that are refused, each with what is printed: its name, the call, the line. The table of `tests/tests/refusals.rs` holds them to it.
+const EXAMPLES: &str = "tests/tests/refusals/examples.txt";
+
+/// What stands above the examples.
+const PRINTED: &str = "
+## As they are printed
+
+Each block is a call and what it prints. A test makes these calls and compares.
+";
+
 /// Writes the page.
 pub(crate) fn write(place: &Place) -> Result<(), Failure> {
     let path = place.root.join("docs/errors.md");
@@ -150,7 +160,7 @@ pub(crate) fn write(place: &Place) -> Result<(), Failure> {
 }
 
 fn page(root: &Path) -> Result<String, String> {
-    let mut out = HEAD.to_owned();
+    let mut out = HEAD.to_owned() + &examples(root)?;
     for (heading, places) in AREAS {
         let mut rows = BTreeSet::new();
         for file in places.iter().flat_map(|place| sources(&root.join(place))) {
@@ -175,6 +185,20 @@ fn page(root: &Path) -> Result<String, String> {
     out += "\n## What a board refuses\n\nThe board gives every reason at once, behind `the board refuses:`.\n\n| it says | what to do |\n| --- | --- |\n";
     for (says, todo) in BOARD {
         let _ = writeln!(out, "| {says} | {todo} |");
+    }
+    Ok(out)
+}
+
+/// Some refusals as they are printed.
+fn examples(root: &Path) -> Result<String, String> {
+    let text = std::fs::read_to_string(root.join(EXAMPLES)).map_err(|e| format!("{EXAMPLES}: {e}"))?;
+    let mut out = PRINTED.to_owned();
+    for block in text.trim_end().split("\n\n") {
+        let Some((name, printed)) = block.split_once('\n') else {
+            return Err(format!("{EXAMPLES}: {block}; expected a name, a call and what it prints, a line each"));
+        };
+        let (first, rest) = name.split_at(name.chars().next().map_or(0, char::len_utf8));
+        let _ = write!(out, "\n{}{rest}:\n\n```text\n{printed}\n```\n", first.to_uppercase()); // a string takes everything
     }
     Ok(out)
 }
@@ -522,6 +546,9 @@ mod tests {
                 "{heading}: an empty table"
             );
         }
+        // refusals as they are printed stand first
+        let printed = page.split(PRINTED).nth(1).and_then(|t| t.split("\n## ").next()).unwrap_or_default();
+        assert!((6..=8).contains(&printed.matches("\n$ quadrig ").count()) && !printed.contains("..."), "{printed}");
         // what is found says more than the name of what holds it
         assert!(page.contains("| the value of `-o` | "), "a word alone says nothing");
         assert!(

@@ -45,6 +45,8 @@ pub struct Name {
     pub words: String,
     /// Odds that a run after the gap gives it, less those of a run before it, and what its channels say, nats.
     pub score: f64,
+    /// Probability that it is this one: of all names of the change and of none of them one is right.
+    pub probability: f64,
 }
 
 /// Names each change of a history; `logs` in the order of its runs. `progress` hears the share that is done. A run that the loop cannot be
@@ -126,8 +128,17 @@ fn names(history: &History, change: &Change, logs: &[&Log], progress: &(dyn Fn(f
     }
     out.retain(|name| name.score > 0.0);
     out.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.id.cmp(&b.id)));
+    weigh(&mut out);
     out.truncate(KEPT);
     out
+}
+
+/// Gives each name its probability: its odds over those of all names and of none of them, whose odds are one.
+fn weigh(names: &mut [Name]) {
+    // the largest is taken off so that no power overflows
+    let top = names.iter().map(|name| name.score).fold(0.0, f64::max);
+    let all = names.iter().map(|name| (name.score - top).exp()).sum::<f64>() + (-top).exp();
+    names.iter_mut().for_each(|name| name.probability = (name.score - top).exp() / all);
 }
 
 /// An effect that the loop names after the gap more than before it.
@@ -147,6 +158,7 @@ impl Found<'_> {
             title: lower(self.effect.about().title),
             words: lower(&self.effect.said(self.entry).sentence()),
             score: self.odds + spoken(change, history, &of_speeds(&self.entry.channels)),
+            probability: 0.0,
         }
     }
 
@@ -160,7 +172,8 @@ impl Found<'_> {
             let channels = instances.iter().map(|i| of_speeds(&i.channels)).filter(|c| c.is_subset(&own));
             let spoken = channels.map(|c| spoken(change, history, &c)).max_by(f64::total_cmp)?;
             let title = lower(effect.about().title);
-            Some(Name { id: effect.id().to_owned(), words: title.clone(), title, score: self.odds + RIVAL.ln() + spoken })
+            let score = self.odds + RIVAL.ln() + spoken;
+            Some(Name { id: effect.id().to_owned(), words: title.clone(), title, score, probability: 0.0 })
         };
         look_alikes.filter_map(told).collect()
     }
@@ -240,6 +253,27 @@ mod tests {
         assert_eq!(of(&["thrust_n"]), MOST);
         assert_eq!(of(&["thrust_n", "torque_nm", "rpm_hall", "rpm_opto"]), MOST - 3.5);
         assert_eq!(of(&["torque_nm"]), -1.5 - MOST);
+    }
+
+    /// Three times as likely is three times as likely, and no name takes the whole: it may be none of them.
+    #[test]
+    fn names_share_one_probability_with_none_of_them() {
+        let of = |scores: &[f64]| -> Vec<f64> {
+            let name = |score: &f64| Name {
+                id: String::new(),
+                title: String::new(),
+                words: String::new(),
+                score: *score,
+                probability: 0.0,
+            };
+            let mut names: Vec<Name> = scores.iter().map(name).collect();
+            weigh(&mut names);
+            names.iter().map(|n| n.probability).collect()
+        };
+        let two = of(&[6f64.ln(), 2f64.ln()]);
+        assert!((two[0] - 6.0 / 9.0).abs() < 1e-12 && (two[1] - 2.0 / 9.0).abs() < 1e-12, "{two:?}");
+        assert!((of(&[0.0])[0] - 0.5).abs() < 1e-12);
+        assert!(of(&[5000.0, 1.0]).iter().all(|p| p.is_finite()) && of(&[]).is_empty());
     }
 
     #[test]

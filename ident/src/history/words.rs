@@ -89,7 +89,7 @@ pub fn sentence(history: &History, change: &Change) -> String {
     };
     let doubt = match change.names.get(..2) {
         Some([best, next]) if best.score - next.score < CLOSE && change.kind == Kind::Step => {
-            format!(" Less likely ({}): {}.", probability(1.0 / (1.0 + (best.score - next.score).exp())), lower(&next.title))
+            format!(" Less likely ({}): {}.", probability(next.probability), lower(&next.title))
         }
         _ => String::new(),
     };

@@ -7,10 +7,11 @@
 
 use crate::channel::unit_of;
 use crate::log::Log;
-use crate::log::join::Joint;
 use crate::log::join::signal::{Signal, pairs};
+use crate::log::join::{Joint, Seen};
+use crate::numeric::order::median;
 use crate::report::{Figure, Layer, Mark, Sheet};
-use crate::verdict::words::{channel, heading};
+use crate::verdict::words::{channel, heading, list};
 
 impl Joint {
     /// The joint in one line.
@@ -49,16 +50,45 @@ pub fn page(stand: &Log, joined: &[(&Log, &Joint)]) -> String {
                 vec![channel(s.channel), format!("{:.4}", s.correlation), later]
             })
             .collect();
-        sheet.table(&["channel", "correlation", "later by, ms"], &rows, |i| i == 0);
+        sheet.table(&["channel", "correlation", "second log later by, ms"], &rows, |i| i == 0);
+        of_sensors(joint).into_iter().chain(of_pieces(joint)).for_each(|told| sheet.say(&told));
         sheet.figures(figures(stand, other, joint, k));
     }
-    sheet.say("A sensor that reads late looks like a clock that is late: the first channel's delay is in the offset, the others' are told against it.");
+    sheet.say("A sensor that reads late looks like a clock that is late. The first channel's delay is in the offset. The others' are told against it.");
     sheet.html()
 }
 
+/// How sure the clocks are: offset and drift together, at the worst time of the run.
 fn lead(joined: &[(&Log, &Joint)]) -> String {
     let worst = joined.iter().map(|(_, j)| j.worst_s).fold(0.0, f64::max);
-    format!("At any time of the run they agree within {:.1} ms (95 %).", 1e3 * worst)
+    format!("The offset between the clocks is known to {:.1} ms or better at any time of the run (95 %).", 1e3 * worst)
+}
+
+/// What the delays of the two sensors of a channel differ by, where that is more than its own interval; the first channel made the joint.
+fn of_sensors(joint: &Joint) -> Option<String> {
+    let apart = joint.seen.iter().skip(1).filter(|s| s.later_s.0.abs() > s.later_s.1);
+    let said = |s: &Seen| {
+        let way = if s.later_s.0 < 0.0 { "earlier" } else { "later" };
+        format!("{} {:.1} ms {way}", channel(s.channel), 1e3 * s.later_s.0.abs())
+    };
+    let all: Vec<String> = apart.map(said).collect();
+    let all = (!all.is_empty()).then(|| list(&all))?;
+    Some(format!(
+        "On the joined clock the second log reads {all} than the stand: by so much the delays of the sensors differ. It is no error of the clocks."
+    ))
+}
+
+/// What one piece of the run alone knows, beside what all know together.
+fn of_pieces(joint: &Joint) -> Option<String> {
+    let mut alone: Vec<f64> = joint.pieces.iter().map(|[_, _, se]| 2e3 * se).collect();
+    (alone.len() > 1).then(|| {
+        format!(
+            "The joint rests on {} pieces of the run. One piece alone knows the offset to {:.1} ms (median; two standard errors): by so much they scatter in the figure. All together know it to {:.1} ms (95 %).",
+            alone.len(),
+            median(&mut alone),
+            1e3 * joint.worst_s
+        )
+    })
 }
 
 fn figures(stand: &Log, other: &Log, joint: &Joint, k: usize) -> Vec<Figure> {
@@ -96,7 +126,7 @@ fn figures(stand: &Log, other: &Log, joint: &Joint, k: usize) -> Vec<Figure> {
     });
     out.push(Figure {
         id: format!("joint-pieces-{k}"),
-        title: "How much later the second clock is, piece by piece".into(),
+        title: "Each piece of the run alone: how much later than the joint".into(),
         x_label: "time, s".into(),
         y_label: "ms".into(),
         layers: vec![
@@ -118,4 +148,38 @@ fn steepest(a: &Signal, b: &Signal, (from, to): (f64, f64)) -> f64 {
     };
     let inside = a.t.iter().copied().filter(|t| (from..=to).contains(t));
     inside.map(|t| (both(t), t)).max_by(|a, b| a.0.total_cmp(&b.0)).map_or(from, |(_, t)| t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three figures in milliseconds: how sure the clocks are, how single pieces scatter, how late a sensor is. Each says which it is.
+    #[test]
+    fn every_figure_says_what_it_is() {
+        let joint = Joint {
+            offset_s: (5.0, 0.002),
+            drift_ppm: (10.0, 20.0),
+            pivot_s: 50.0,
+            worst_s: 0.0033,
+            overlap_s: (0.0, 100.0),
+            seen: vec![
+                Seen { channel: "rpm", correlation: 0.999, later_s: (0.0, 0.002) },
+                Seen { channel: "current_a", correlation: 0.998, later_s: (-0.0413, 0.0183) },
+                Seen { channel: "voltage_v", correlation: 0.993, later_s: (0.01, 0.0838) },
+            ],
+            pieces: vec![[10.0, 0.01, 0.02], [50.0, -0.01, 0.0205], [90.0, 0.0, 0.03]],
+        };
+        let other = Log { name: "esc.csv".into(), ..Log::default() };
+        assert_eq!(
+            lead(&[(&other, &joint)]),
+            "The offset between the clocks is known to 3.3 ms or better at any time of the run (95 %)."
+        );
+        let told = of_sensors(&joint).expect("a late sensor");
+        assert!(told.contains("the second log reads current 41.3 ms earlier than the stand: by so much the delays"), "{told}");
+        let told = of_pieces(&joint).expect("pieces");
+        assert!(told.contains("One piece alone knows the offset to 41.0 ms (median; two standard errors)"), "{told}");
+        assert!(told.ends_with("All together know it to 3.3 ms (95 %)."), "{told}");
+        assert_eq!(of_pieces(&Joint { pieces: Vec::new(), ..joint }), None);
+    }
 }

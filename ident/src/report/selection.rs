@@ -1,14 +1,14 @@
 //! The page of a selection: Tables 8 and 9, Figures 6.2 to 6.4 and A.13 to A.30.
 //!
 //! What it is: maxima of every pair as columns, efficiency against the mass that can hover, endurance and efficiency against
-//! resultant force for each battery count, the table, and what is chosen.
+//! resultant force for each battery count, the table, and what is chosen. What would be a lone dot is said in words.
 //! What can go wrong: pairs without a result are named under the table, with why.
 //! Units: N, A, kg, min.
 //! Reference: Beharie 2013, section 6.1 and Appendix A.
 
 use super::figure::{Figure, Layer, Mark};
 use super::sheet::Sheet;
-use crate::sizing::select::{Airframe, Need, Pair, Row, choose};
+use crate::sizing::select::{Airframe, Need, Pair, Row, WithBatteries, choose};
 use crate::verdict::words::list;
 
 /// Colours in the order of the motors.
@@ -65,6 +65,19 @@ pub fn selection(
         ));
     }
     sheet.section("All pairs (Figures 6.2 to 6.4)");
+    all_pairs(&mut sheet, rows);
+    sheet.section("Endurance and efficiency against resultant force (Figures A.13 to A.30)");
+    endurances(&mut sheet, rows, batteries);
+    sheet.comes_from(from);
+    sheet
+}
+
+/// Figures over all pairs; one pair alone has none.
+fn all_pairs(sheet: &mut Sheet, rows: &[Row]) {
+    if let [only] = rows {
+        sheet.say(&at_full_throttle(only));
+        return;
+    }
     sheet.figures(vec![
         columns(rows, "fig-6-2-thrust", "Thrust at full throttle", "thrust of one motor, N", |r| r.total_thrust_n.0 / 4.0),
         columns(rows, "fig-6-3-current", "Current at full throttle", "current of one motor, A", |r| {
@@ -73,11 +86,51 @@ pub fn selection(
         columns(rows, "fig-6-4-efficiency", "Thrust for each ampere (Eq. 6.1)", "N per A", |r| r.efficiency_n_per_a),
         hover_mass(rows),
     ]);
-    sheet.section("Endurance and efficiency against resultant force (Figures A.13 to A.30)");
-    let figures = motors(rows).iter().flat_map(|m| (1..=batteries).map(|n| endurance(rows, m, n)).collect::<Vec<_>>()).collect();
-    sheet.figures(figures);
-    sheet.comes_from(from);
-    sheet
+}
+
+/// A figure for each motor and battery count; of a motor with one propeller its values in words.
+fn endurances(sheet: &mut Sheet, rows: &[Row], batteries: u32) {
+    let motors = motors(rows);
+    for motor in &motors {
+        if let [only] = of_motor(rows, motor)[..] {
+            only.with_batteries.iter().filter(|w| w.batteries <= batteries).for_each(|w| sheet.say(&lasts(only, w)));
+        }
+    }
+    let drawn = motors.iter().filter(|motor| of_motor(rows, motor).len() > 1);
+    sheet.figures(drawn.flat_map(|m| (1..=batteries).map(|n| endurance(rows, m, n)).collect::<Vec<_>>()).collect());
+}
+
+/// Rows of one motor.
+fn of_motor<'r>(rows: &'r [Row], motor: &str) -> Vec<&'r Row> {
+    rows.iter().filter(|r| r.pair.motor == motor).collect()
+}
+
+/// What a lone pair does at full throttle.
+fn at_full_throttle(row: &Row) -> String {
+    let current = row.pair.maximum.map_or_else(String::new, |m| format!(" for {:.2} A", m.current_a.0));
+    format!(
+        "One pair alone has nothing to be drawn against. At full throttle one motor gives {:.3} N{current}, {:.2} N per A. Four of them hold {:.2} kg in hover.",
+        row.total_thrust_n.0 / 4.0,
+        row.efficiency_n_per_a,
+        row.hover_mass_kg.0
+    )
+}
+
+/// How long a pair lasts with some batteries, and what it lifts beyond the weight.
+fn lasts(row: &Row, with: &WithBatteries) -> String {
+    format!(
+        "{}, {}: {:.1} min at full throttle, resultant force {} N, {:.2} N per A.",
+        row.pair.name(),
+        counted(with.batteries),
+        with.full_throttle_min.0,
+        tenths(with.resultant_n.0),
+        row.efficiency_n_per_a
+    )
+}
+
+/// "1 battery", "2 batteries".
+fn counted(batteries: u32) -> String {
+    format!("{batteries} batter{}", if batteries == 1 { "y" } else { "ies" })
 }
 
 fn table(sheet: &mut Sheet, rows: &[Row], chosen: &[&Row], batteries: u32) {
@@ -229,7 +282,7 @@ fn endurance(rows: &[Row], motor: &str, batteries: u32) -> Figure {
     let efficiency = of(&|r| Some((10.0 * r.efficiency_n_per_a, format!("{:.2} N per A", r.efficiency_n_per_a))));
     Figure {
         id: format!("endurance-{}-{batteries}", motor.to_lowercase()),
-        title: format!("{motor} with {batteries} batter{}", if batteries == 1 { "y" } else { "ies" }),
+        title: format!("{motor} with {}", counted(batteries)),
         x_label: "resultant force at full throttle, N".to_owned(),
         y_label: "min; 10 x N per A".to_owned(),
         layers: vec![
@@ -237,5 +290,42 @@ fn endurance(rows: &[Row], motor: &str, batteries: u32) -> Figure {
             Layer::Marks { name: "10 x efficiency, N per A".to_owned(), class: "b", marks: efficiency },
         ],
         ..Figure::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::quantity::{Kilogram, Minute, Newton};
+    use crate::sizing::select::{row, thesis};
+
+    const NEED: Need =
+        Need { total_thrust_n: Newton(1.0), batteries: 1, full_throttle_min: Minute(0.0), resultant_n: Newton(-1000.0) };
+
+    /// The page of some of the pairs of one motor.
+    fn page(motor: &str, pairs: usize) -> (Sheet, Vec<Row>) {
+        let airframe = Airframe { bare_kg: Kilogram(0.774), ..Airframe::default() };
+        let pairs: Vec<Pair> = thesis().into_iter().filter(|p| p.motor == motor && p.maximum.is_some()).take(pairs).collect();
+        let rows: Vec<Row> = pairs.iter().filter_map(|p| row(p, &airframe, 2)).collect();
+        (selection(&pairs, &rows, &airframe, (&NEED, 2), &[]), rows)
+    }
+
+    /// A lone dot is no figure: its values are said.
+    #[test]
+    fn one_pair_is_said_and_not_drawn() {
+        let (sheet, rows) = page("570KV", 1);
+        let html = sheet.html();
+        assert!(sheet.drawn().is_empty() && !html.contains("<figure"), "{:?}", sheet.drawn());
+        let only = rows.first().expect("a row");
+        assert!(html.contains(&at_full_throttle(only)));
+        assert_eq!(html.matches(&format!("<p>{}, ", only.pair.name())).count(), 2, "1 battery, 2 batteries");
+        assert!(html.contains(", 1 battery: ") && html.contains(", 2 batteries: "));
+    }
+
+    #[test]
+    fn two_pairs_are_drawn() {
+        let (sheet, _) = page("570KV", 2);
+        assert_eq!(sheet.drawn().len(), 6);
+        assert!(!sheet.html().contains("One pair alone"));
     }
 }

@@ -20,6 +20,7 @@ mod streams;
 mod table;
 mod text;
 mod ulog;
+mod uneven;
 mod unit;
 
 pub use flight::{flight, flight_from};
@@ -187,7 +188,7 @@ pub fn import_from(file: &str, source: impl Read, options: &Options) -> Result<(
     let layout = layout::find(file, &text, options, &mut report)?;
     let place = Place { file, line: layout.line as usize };
     let (route, mut fields) = table::plan(file, &layout, options, &mut report)?;
-    table::read_rows(file, &layout, &route, &mut fields, &mut report)?;
+    let lines = table::read_rows(file, &layout, &route, &mut fields, &mut report)?;
     if fields.first().is_none_or(|f| f.values.is_empty()) {
         return Err(place.refuse(None, "no data rows", "at least one line of numbers under the header"));
     }
@@ -195,7 +196,7 @@ pub fn import_from(file: &str, source: impl Read, options: &Options) -> Result<(
     settle::settle(&place, &mut fields, options.pole_pairs.or(said), &mut report)?;
     let mapped: Vec<String> = fields.iter().filter(|f| f.mapped).map(|f| f.name.clone()).collect();
     let (names, columns) = fields.into_iter().map(|f| (f.name, f.values)).unzip();
-    let mut log = repair::assemble(&place, names, columns, &mut report)?;
+    let mut log = repair::assemble(&place, names, columns, &lines, &mut report)?;
     let related = log.measured().count() + usize::from(log.column("pulse_us").is_some());
     if related < 2 {
         return Err(place.refuse(

@@ -11,15 +11,16 @@ use crate::log::{Column, Log, MODELLED, Place, ReadError, SPEED};
 use crate::numeric::order::median;
 
 /// More than this share of rows dropped is no repair any more.
-const DROPPED: f64 = 0.2;
+pub(super) const DROPPED: f64 = 0.2;
 /// Two speeds differ when the one is off the other by more than this share.
 const DIFFER: f64 = 0.02;
 
-/// Names and values become a log.
+/// Names and values become a log; `lines` holds the line of each row.
 pub(super) fn assemble(
     place: &Place<'_>,
     mut names: Vec<String>,
     mut columns: Vec<Vec<f64>>,
+    lines: &[u64],
     report: &mut Report,
 ) -> Result<Log, ReadError> {
     let mut log = Log::default();
@@ -35,7 +36,7 @@ pub(super) fn assemble(
             (0..rows).map(|i| i as f64).collect()
         }
     };
-    let keep = increasing(place, &t, report)?;
+    let keep = increasing(place, &t, lines, report)?;
     log.t = keep.iter().map(|i| t[*i]).collect();
     if let Some(first) = log.t.first().copied().filter(|t| *t > 1e9) {
         log.t.iter_mut().for_each(|t| *t = ((*t - first) * 1e6).round() / 1e6);
@@ -130,19 +131,24 @@ fn one_speed(log: &mut Log, report: &mut Report) {
 }
 
 /// Rows whose time moves on. A stamp that repeats or steps back loses its row.
-fn increasing(place: &Place<'_>, t: &[f64], report: &mut Report) -> Result<Vec<usize>, ReadError> {
+fn increasing(place: &Place<'_>, t: &[f64], lines: &[u64], report: &mut Report) -> Result<Vec<usize>, ReadError> {
     let (mut keep, mut last) = (Vec::with_capacity(t.len()), f64::NEG_INFINITY);
     let (mut equal, mut back, mut blank) = (0, 0, 0);
+    // the first of each kind
+    let mut firsts = [None; 3];
     for (i, v) in t.iter().enumerate() {
         if v.is_nan() {
             blank += 1;
+            firsts[2] = firsts[2].or(lines.get(i));
         } else if *v > last {
             keep.push(i);
             last = *v;
         } else if *v == last {
             equal += 1;
+            firsts[0] = firsts[0].or(lines.get(i));
         } else {
             back += 1;
+            firsts[1] = firsts[1].or(lines.get(i));
         }
     }
     let dropped = equal + back + blank;
@@ -169,9 +175,14 @@ fn increasing(place: &Place<'_>, t: &[f64], report: &mut Report) -> Result<Vec<u
             "a clock that moves on in at least four rows of five (another column with --map t_s=COLUMN)",
         ));
     }
-    report.add("t_s", "time stamps that repeat the row before: row dropped", equal);
-    report.add("t_s", "time stamps that step back: row dropped", back);
-    report.add("t_s", "blank time stamps: row dropped", blank);
+    let first = |line: Option<&u64>| line.map_or_else(String::new, |line| format!(", the first on line {line}"));
+    for (what, line, count) in [
+        ("time stamps that repeat the row before", firsts[0], equal),
+        ("time stamps that step back", firsts[1], back),
+        ("blank time stamps", firsts[2], blank),
+    ] {
+        report.add("t_s", format!("{what}: row dropped{}", first(line)), count);
+    }
     Ok(keep)
 }
 

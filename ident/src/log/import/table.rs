@@ -2,7 +2,7 @@
 //!
 //! What it is: a foreign CSV becomes columns of numbers by the dictionary of [`super::header`].
 //! What can go wrong: text in a column of numbers (refused with its place; a further column that holds mostly text is left out), fields
-//! missing or too many (refused), a quantity without a unit (its values may tell, else refused).
+//! that are read missing, or too many (refused; of others see [`super::uneven`]), a quantity without a unit (its values may tell, else refused).
 //! Units: the contract's.
 //! Reference: specification `formats.md`, `quadrig import`.
 
@@ -10,6 +10,7 @@ use super::clock::{Stamp, stamp};
 use super::header::{ELECTRICAL, Target, clean, quantity_of, sort_all, split_unit};
 use super::layout::{Layout, Records};
 use super::number::{Cell, cell};
+use super::uneven::Uneven;
 use super::{Mapping, Options, Report};
 use crate::log::{Place, ReadError, named_shortly, short};
 
@@ -199,44 +200,57 @@ fn is_a_channel(m: &Mapping, place: &Place<'_>, report: &mut Report) -> Result<(
     Ok(())
 }
 
-/// Reads every row into the fields.
+/// Reads every row into the fields; the line of each.
 pub(super) fn read_rows(
     file: &str,
     layout: &Layout<'_>,
     route: &[Option<usize>],
     fields: &mut Vec<Field>,
     report: &mut Report,
-) -> Result<(), ReadError> {
+) -> Result<Vec<u64>, ReadError> {
     let width = layout.cells.len();
     let lines = layout.content.lines().count() as u64;
     let (mut cut, mut records) = (0, Records::new(&layout.content, layout.separator));
+    let (mut uneven, mut read) = (Uneven::of(layout), Vec::new());
     while let Some((line, record)) = records.next() {
-        if line < layout.data_from || record.iter().all(str::is_empty) {
+        if line < layout.data_from {
+            continue;
+        }
+        if record.iter().all(str::is_empty) {
+            uneven.leave_blank(line);
             continue;
         }
         let place = Place { file, line: line as usize };
         let needed = route.iter().rposition(Option::is_some).map_or(0, |k| k + 1);
         let surplus = record.iter().skip(width).any(|c| !c.is_empty());
+        if (record.len() < needed || surplus || uneven.is_short(record.len())) && !layout.whole && line == lines {
+            cut = 1;
+            break;
+        }
         if record.len() < needed || surplus {
-            if !layout.whole && line == lines {
-                cut = 1;
-                break;
-            }
             let commas = if surplus && layout.separator == b',' { " (decimal commas? then export with semicolons)" } else { "" };
             let missing = layout.cells.get(record.len()).map(String::as_str);
             return Err(place.refuse(missing, format!("{} fields", record.len()), format!("{width} as in the header{commas}")));
         }
+        if uneven.is_short(record.len()) {
+            uneven.drop_short(line);
+            continue;
+        }
+        uneven.take(line, record);
+        read.push(line);
         for (text, k) in record.iter().zip(route) {
             let Some(field) = k.and_then(|k| fields.get_mut(k)) else { continue };
             let value = field.read(text, line, layout, &place)?;
             field.values.push(value);
         }
     }
+    uneven.settle(file, report)?;
     report.add("(file)", "last line cut short without a line feed: dropped", cut);
     for field in fields.iter().filter(|f| f.missing > 0) {
         report.add(&field.name, "words or signs for no value (NaN, inf, -, n/a), kept as missing", field.missing);
     }
-    settle_text(file, fields, report)
+    settle_text(file, fields, report)?;
+    Ok(read)
 }
 
 impl Field {

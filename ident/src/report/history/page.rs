@@ -1,14 +1,14 @@
 //! A rig's history as one page.
 //!
 //! What it is: what changed as its heading, control charts of what moved and of the constants, each change in numbers; folded away every other
-//! measure, the values run by run, and the logs.
+//! measure and the values run by run; at the end the logs with their digests.
 //! What can go wrong: nothing; a measure without a run before the change has no chart.
 //! Units: on the axes.
 //! Reference: Tufte, "The Visual Display of Quantitative Information" (small multiples).
 
 use super::chart::chart;
 use super::{MOVED, bracketed, foremost, why_no_change};
-use crate::history::{Change, History, fewest_judged, gap, sentence, summary};
+use crate::history::{Change, Entry, History, Name, fewest_judged, gap, sentence, summary};
 use crate::report::sheet::Sheet;
 use crate::verdict::words::{probability, upper, with_interval};
 
@@ -36,12 +36,15 @@ pub fn page(history: &History) -> String {
         sheet.fold("Every other measure", |sheet| sheet.multiples(below.iter().filter_map(|m| chart(history, *m)).collect()));
     }
     sheet.fold("Constants run by run", |sheet| table(sheet, history));
-    sheet.fold("Logs", |sheet| {
-        sheet.say(&format!("Compared by quadrig {}.", env!("CARGO_PKG_VERSION")));
-        let row = |k: usize| vec![history.label(k), history.runs[k].run.clone(), history.runs[k].sha256.clone()];
-        sheet.data("logs", &["run", "log", "SHA-256"], &(0..history.runs.len()).map(row).collect::<Vec<_>>(), None);
-    });
+    origin(&mut sheet, history);
     sheet.html()
+}
+
+/// The program, and the logs with their digests.
+fn origin(sheet: &mut Sheet, history: &History) {
+    sheet.comes_from(&[("runs", history.runs.len().to_string())]);
+    let row = |(k, run): (usize, &Entry)| vec![history.label(k), run.run.clone(), run.sha256.clone()];
+    sheet.data("logs", &["run", "log", "SHA-256"], &history.runs.iter().enumerate().map(row).collect::<Vec<_>>(), None);
 }
 
 /// What changed first, then over how many runs.
@@ -98,11 +101,19 @@ fn of_change(sheet: &mut Sheet, history: &History, change: &Change) {
     };
     let rows: Vec<Vec<String>> = change.moved.iter().map(row).collect();
     sheet.data("moved", &["moved", "by", "95 % interval", "unit"], &rows, None);
-    if !change.names.is_empty() {
-        let row = |n: &crate::history::Name| vec![upper(&n.title), format!("{:.1}", n.score), n.id.clone()];
-        let rows: Vec<Vec<String>> = change.names.iter().map(row).collect();
-        sheet.data("names", &["name", "evidence, nats", "effect"], &rows, None);
+    names(sheet, &change.names);
+}
+
+/// What a change may be called, each with its probability; the file has the odds behind it too.
+fn names(sheet: &mut Sheet, names: &[Name]) {
+    if names.is_empty() {
+        return;
     }
+    let row = |n: &Name| vec![upper(&n.title), probability(n.probability), n.id.clone()];
+    let raw = |n: &Name| vec![n.title.clone(), n.probability.to_string(), n.score.to_string(), n.id.clone()];
+    let raw: Vec<Vec<String>> = names.iter().map(raw).collect();
+    let head = ["name", "probability", "log_odds_nats", "effect"];
+    sheet.data("names", &["name", "probability", "effect"], &names.iter().map(row).collect::<Vec<_>>(), Some((&head, &raw)));
 }
 
 fn table(sheet: &mut Sheet, history: &History) {
@@ -142,5 +153,37 @@ mod tests {
                 && !html.contains(super::super::NO_CHANGE)
         );
         assert!(page(&stepped(4, 4)).contains("the geometric mean"));
+    }
+
+    /// What a reader sees is a probability; the odds behind it stand in the file alone.
+    #[test]
+    fn a_name_has_its_probability() {
+        let mut history = stepped(12, 7);
+        let name = |title: &str, score: f64, probability: f64| Name {
+            id: title.replace(' ', "_"),
+            title: title.to_owned(),
+            words: title.to_owned(),
+            score,
+            probability,
+        };
+        history.changes[0].names = vec![name("one cause", 2.5, 0.71), name("its rival", 1.5, 0.26)];
+        let html = page(&history);
+        assert!(
+            html.contains("<td>One cause</td><td data-of=\"probability\">0.71</td>") || html.contains("<td>0.71</td>"),
+            "{html}"
+        );
+        assert!(html.contains("Less likely (0.26): its rival."), "{html}");
+        assert!(!html.contains("evidence, nats") && html.contains("name,probability,log_odds_nats,effect"));
+    }
+
+    #[test]
+    fn the_page_says_where_it_comes_from() {
+        let mut history = stepped(12, 7);
+        history.runs[3].sha256 = "5eed".into();
+        let html = page(&history);
+        let (_, end) = html.split_once("Where this comes from").expect("a section of its own");
+        for said in [&format!("quadrig {}", env!("CARGO_PKG_VERSION")), "<td>12</td>", "3.csv", "5eed"] {
+            assert!(end.contains(said), "{said}");
+        }
     }
 }
