@@ -892,16 +892,17 @@ fn all_is_what_stood_above_the_noise_floor() {
 
 /// A lead acts on speed, current and voltage: the reader looks at the voltage first.
 #[test]
-fn a_share_is_told_of_every_quantity_that_was_plain() {
+fn against_a_model_a_share_is_told_of_every_quantity_that_was_plain() {
     let mut of = verdict(Kind::Attributed, vec![sag(0.95)]);
     of.effects[0].channels = vec!["thrust_n".into(), "voltage_v".into()];
-    let said = sentence(&of, Vocabulary::RIG, false);
+    let said = sentence(&of, Vocabulary::RIG, true);
     assert!(said.contains("of what thrust and voltage had left over"), "{said}");
+    assert!(sentence(&of, Vocabulary::RIG, false).contains("of what thrust had left over"), "the first channel alone");
     // two floors were nothing to look at
     if let Some(c) = of.channels.predicted.get_mut("voltage_v") {
         c.before.heldout_rms = 0.02;
         c.after.heldout_rms = 0.01;
     }
-    let said = sentence(&of, Vocabulary::RIG, false);
+    let said = sentence(&of, Vocabulary::RIG, true);
     assert!(said.contains("of what thrust had left over"), "{said}");
 }

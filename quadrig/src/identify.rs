@@ -18,7 +18,7 @@ use ident::identify::{Identified, identify, identify_in};
 use ident::log::Log;
 use ident::numeric::digits::number;
 use ident::plateau::so_many;
-use ident::report::{Sheet, WIDEST, aside_lines, headline, wrapped};
+use ident::report::{Sheet, WIDEST, headline, wrapped};
 use ident::verdict::words::{bracketed, channel, to_error};
 use std::path::PathBuf;
 
@@ -91,7 +91,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         written.push(path);
     }
     if !quiet {
-        crate::say::text(&(text(&found) + &aside_lines(&found.set_aside, "which `close-loop` lists") + &told(&log)));
+        crate::say::text(&(text(&found) + &told(&log)));
     }
     match (&args.surface, &found.surface) {
         (Some(path), Err(why)) => {

@@ -14,7 +14,6 @@ use crate::identify::curves::{Estimate, Fitted, Law, Spin, Zero, declared, motor
 use crate::log::Log;
 use crate::model::{FittedTo, Model};
 use crate::plateau::{Plateau, detect};
-use crate::signal::bad::{self, SetAside};
 
 /// Why the loop cannot be closed on a log.
 #[derive(Debug, thiserror::Error)]
@@ -108,8 +107,6 @@ pub struct Identified {
     pub levels: Vec<Level>,
     /// Thrust over throttle and voltage, or why it is not known.
     pub surface: Result<Surface, String>,
-    /// Readings that the rest of the log rules out; nothing above counts them.
-    pub set_aside: Vec<SetAside>,
 }
 
 /// Identifies a log.
@@ -125,8 +122,6 @@ pub fn identify(log: &Log) -> Result<Identified, CloseError> {
 /// # Errors
 /// As [`identify`].
 pub fn identify_in(log: &Log, air_kg_m3: Option<f64>) -> Result<Identified, CloseError> {
-    let aside = bad::found(log);
-    let log = &*bad::without(log, &aside);
     let context = Context::bare(log, None);
     // the fits over all rows and the plateaus need nothing of each other: one core each
     let (fitted, plateaus) = std::thread::scope(|scope| {
@@ -176,7 +171,6 @@ pub fn identify_in(log: &Log, air_kg_m3: Option<f64>) -> Result<Identified, Clos
         disc,
         levels,
         surface,
-        set_aside: aside.into_iter().filter(|a| !a.recurs).collect(),
     })
 }
 

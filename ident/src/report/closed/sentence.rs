@@ -126,7 +126,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         ),
         false => format!("{}.", since(news, &joined_lower(&clauses))),
     };
-    let explained = explained(verdict, &told, false);
+    let explained = explained(verdict, &told, false, news);
     // what says that more is told below has said so
     let more = if explained.as_ref().is_some_and(|e| e.says_more) { 0 } else { more };
     [out, explained.map(|e| e.said).unwrap_or_default(), below(more, true, false), left(verdict)]
@@ -247,7 +247,7 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
     let below = below(causes(all).saturating_sub(told), !larger, nameless);
     let joined = |parts: [String; 3]| parts.into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
     let asked: Vec<&EffectEntry> = sure.iter().chain(disputed).copied().collect();
-    let Some(explained) = explained(verdict, &asked, true) else { return joined([out, below, left(verdict)]) };
+    let Some(explained) = explained(verdict, &asked, true, news) else { return joined([out, below, left(verdict)]) };
     // what says that more is told below has said so
     let rest = if explained.says_more { String::new() } else { below.clone() };
     let said = joined([format!("{out} {}", explained.said), rest, left(verdict)]);
@@ -436,10 +436,11 @@ fn was_plain_and_is_gone(verdict: &Verdict, name: &str) -> bool {
     floors > LOUD && share(verdict, name).is_some_and(|s| s > HALF)
 }
 
-/// How much the effects explain of what their first channels had left over, and the others on which most is gone; nothing where that is not worth
-/// a figure. `open`: which of them are there is a question.
-fn explained(verdict: &Verdict, told: &[&EffectEntry], open: bool) -> Option<Explained> {
-    let further = told.iter().flat_map(|e| e.channels.iter().skip(1)).filter(|c| was_plain_and_is_gone(verdict, c));
+/// How much the effects explain of what their first channels had left over; against a declared model also of the others on which most is gone, for all of
+/// that is new. Nothing where that is not worth a figure. `open`: which of them are there is a question.
+fn explained(verdict: &Verdict, told: &[&EffectEntry], open: bool, news: bool) -> Option<Explained> {
+    let further =
+        told.iter().filter(|_| news).flat_map(|e| e.channels.iter().skip(1)).filter(|c| was_plain_and_is_gone(verdict, c));
     let mut on: Vec<&str> = told.iter().filter_map(|e| e.channels.first()).chain(further).map(String::as_str).collect();
     on.sort_unstable();
     on.dedup_by_key(|c| whole(verdict, c));
