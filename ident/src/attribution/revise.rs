@@ -112,12 +112,12 @@ fn as_well(new: &Held, old: &Held) -> bool {
 
 /// Whether a candidate's newest effect is this one, on the same channels and in the same form.
 fn is_as(candidate: &Candidate, placed: &Placed) -> bool {
-    newest_is(candidate, placed) && candidate.fit.placed.last().is_some_and(|p| p.instance == placed.instance)
+    newest_is(candidate, placed) && newest(candidate).is_some_and(|p| p.instance == placed.instance)
 }
 
 /// Whether a candidate's newest effect is this one, in whatever form.
 fn newest_is(candidate: &Candidate, placed: &Placed) -> bool {
-    candidate.fit.placed.last().is_some_and(|p| p.effect.id() == placed.effect.id())
+    newest(candidate).is_some_and(|p| p.effect.id() == placed.effect.id())
 }
 
 /// The hypothesis without its `k`-th effect, and everything that applies for the place, best first.

@@ -157,7 +157,7 @@ fn declared(runs: &[Run], contexts: &[Context], members: &[Member<'_>]) -> Model
 }
 
 /// The pulse at which the rig's motor starts: between the highest at which it stands on any run and the lowest at which it turns. Each run by itself
-/// tells it no finer than its own levels lie.
+/// tells it no finer than its own levels lie. As the noise floors, it is of all runs, so that a run which the others predict has its part in it.
 fn start_pulse<'c>(runs: impl Iterator<Item = &'c Context>) -> f64 {
     let (mut t, mut pulse, mut rpm) = (Vec::new(), Vec::new(), Vec::new());
     for context in runs {

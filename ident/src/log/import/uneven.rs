@@ -9,6 +9,7 @@ use super::Report;
 use super::layout::{Layout, Records};
 use super::repair::DROPPED;
 use crate::log::{Place, ReadError};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 /// Some lines: how many, and the first of them.
@@ -34,12 +35,12 @@ impl Lines {
 }
 
 /// The lines of a table that are no row of it.
-#[derive(Debug)]
-pub(super) struct Uneven {
+pub(super) struct Uneven<'l> {
+    layout: &'l Layout<'l>,
     /// Fields that the header promises.
     width: usize,
-    /// Fields that most rows have: a program may leave out the last ones where they are empty.
-    usual: usize,
+    /// Fields that most rows have: a program may leave out the last ones where they are empty. Counted where a row is short.
+    usual: OnceCell<usize>,
     short: Lines,
     quoted: Lines,
     blank: Lines,
@@ -48,15 +49,15 @@ pub(super) struct Uneven {
     rows: usize,
 }
 
-impl Uneven {
-    pub(super) fn of(layout: &Layout<'_>) -> Self {
+impl<'l> Uneven<'l> {
+    pub(super) fn of(layout: &'l Layout<'l>) -> Self {
         let (width, none) = (layout.cells.len(), Lines::default());
-        Self { width, usual: usual(layout), short: none, quoted: none, blank: none, pending: none, rows: 0 }
+        Self { layout, width, usual: OnceCell::new(), short: none, quoted: none, blank: none, pending: none, rows: 0 }
     }
 
     /// Whether a record has fewer fields than the header and than most rows.
     pub(super) fn is_short(&self, fields: usize) -> bool {
-        fields < self.width && fields < self.usual
+        fields < self.width && fields < *self.usual.get_or_init(|| usual(self.layout))
     }
 
     pub(super) fn drop_short(&mut self, line: u64) {

@@ -34,7 +34,7 @@ pub use provenance::{Hidden, Origin};
 pub(crate) use sentence::loudest;
 pub use sentence::sentence;
 pub(crate) use state::bars;
-pub use terminal::{WIDEST, aside_lines, terminal, wrapped};
+pub use terminal::{WIDEST, terminal, wrapped};
 pub use vocabulary::Vocabulary;
 pub(crate) use vocabulary::{ALL_ROWS, bare};
 #[cfg(test)]
