@@ -92,7 +92,7 @@ impl Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let svg = args.svg.as_deref().map(|path| Folder::new(path, "beam --svg")).transpose()?;
     let design = design(args);
-    let speeds = speeds(args)?;
+    let speeds = speeds(args, quiet)?;
     let met = design.crossings(args.blades, &speeds, args.near / 100.0);
     let sheet = beam(&design, args.blades, &met);
     if let Some(path) = &args.output {
@@ -153,9 +153,9 @@ fn design(args: &Args) -> Beam {
     }
 }
 
-fn speeds(args: &Args) -> Result<Vec<RevPerMin>, Failure> {
+fn speeds(args: &Args, quiet: bool) -> Result<Vec<RevPerMin>, Failure> {
     let Some(path) = &args.run else { return Ok(args.speeds.iter().map(|s| RevPerMin(*s)).collect()) };
-    let log = open(path, &Options::default(), true)?;
+    let log = open(path, &Options::default(), quiet)?;
     let context = Context::new(&log, None);
     if context.rpm.is_empty() {
         return Err(format!(

@@ -8,7 +8,7 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::Folder;
-use crate::open::{Columns, Names, may_be_a_run, no_run_in, open};
+use crate::open::{Columns, Names, may_be_a_run, no_run_in, opened};
 use crate::progress::Bar;
 use crate::trouble::unread;
 use ident::history::{Change, Chart, Entry, History, Measure, named, summary};
@@ -17,9 +17,8 @@ use ident::report::{history_page, history_terminal};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Shares of the time that reading and comparing take; the rest goes into names.
-const READ: f64 = 0.1;
-const COMPARED: f64 = 0.4;
+/// Share of the time that comparing takes; the rest goes into names.
+const COMPARED: f64 = 0.33;
 
 /// Arguments.
 #[derive(clap::Args)]
@@ -70,10 +69,11 @@ struct Charted<'h> {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let folder = args.output.as_deref().map(|path| Folder::new(path, "history")).transpose()?;
     let files = files(&args.runs)?;
+    let (logs, refused, found) = read(&files, args, quiet);
+    found.iter().filter(|_| !quiet).for_each(|line| note!("{line}"));
     let history = {
         let bar = Bar::new("comparing", quiet);
-        let (logs, refused) = read(&files, args, &bar);
-        let compared = History::of(&logs, &|share| bar.set(READ + (COMPARED - READ) * share));
+        let compared = History::of(&logs, &|share| bar.set(COMPARED * share));
         let (mut history, order) = compared.map_err(|why| format!("{why}{}", without(&refused)))?;
         refused.iter().for_each(|line| note!("left out: {line}"));
         let ordered: Vec<&Log> = order.iter().map(|k| &logs[*k]).collect();
@@ -95,18 +95,22 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The runs, and a line for each file that is none.
-fn read(files: &[PathBuf], args: &Args, bar: &Bar) -> (Vec<Log>, Vec<String>) {
+/// The runs, a line for each file that is none, and what was found in the others.
+fn read(files: &[PathBuf], args: &Args, quiet: bool) -> (Vec<Log>, Vec<String>, Vec<String>) {
     let options = args.columns.options(&args.names);
-    let (mut logs, mut refused) = (Vec::new(), Vec::new());
+    let bar = Bar::new("reading", quiet);
+    let (mut logs, mut refused, mut found) = (Vec::new(), Vec::new(), Vec::new());
     for (k, path) in files.iter().enumerate() {
-        match open(path, &options, true) {
-            Ok(log) => logs.push(log),
+        match opened(path, &options) {
+            Ok((log, remarks)) => {
+                logs.push(log);
+                found.extend(remarks);
+            }
             Err(e) => refused.push(e.to_string().replace('\n', " ")),
         }
-        bar.set(READ * (k + 1) as f64 / files.len() as f64);
+        bar.set((k + 1) as f64 / files.len() as f64);
     }
-    (logs, refused)
+    (logs, refused, found)
 }
 
 /// What a refusal says of the files that are none.

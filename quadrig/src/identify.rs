@@ -76,7 +76,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let svg = args.svg.as_deref().map(|path| Folder::new(path, "identify --svg")).transpose()?;
     let log = open(&args.log, &args.columns.options(&args.names), quiet)?;
     let found = identify_in(&log, args.air)?;
-    let sheet = (args.report.is_some() || args.svg.is_some()).then(|| draw(args, &log, &found)).transpose()?;
+    let sheet = (args.report.is_some() || args.svg.is_some()).then(|| draw(args, &log, &found, quiet)).transpose()?;
     let surface = args.surface.as_ref().zip(found.surface.as_ref().ok()).map(|(path, surface)| (path, surface.csv()));
     let table = args.table.as_ref().map(|path| (path, csv(&found.plateaus, &found.levels)));
     let page = args.report.as_ref().zip(sheet.as_ref()).map(|(path, sheet)| (path, sheet.html()));
@@ -109,10 +109,10 @@ fn there(written: &[&PathBuf]) -> String {
 }
 
 /// The page and the figures.
-fn draw(args: &Args, log: &Log, found: &Identified) -> Result<Sheet, Failure> {
+fn draw(args: &Args, log: &Log, found: &Identified, quiet: bool) -> Result<Sheet, Failure> {
     let second = match &args.beside {
         Some(path) => {
-            let log = open(path, &args.columns.options(&args.names), true)?;
+            let log = open(path, &args.columns.options(&args.names), quiet)?;
             let found = identify(&log)?;
             Some((log, found))
         }

@@ -9,6 +9,7 @@
 use crate::Failure;
 use crate::apart::Paths;
 use crate::folder::Folder;
+use crate::open::found;
 use crate::trouble::unread;
 use ident::log::import::import;
 use ident::log::{FORMAT, Log, SPEED};
@@ -106,7 +107,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let (mut page, mut pictures) = (format!("{HEAD}{TABLE}"), String::new());
     let mut headed = false;
     for path in &args.logs {
-        let log = read(path)?;
+        let log = read(path, quiet)?;
         let channel = match &args.channel {
             Some(name) => name.as_str(),
             None => SPEED.into_iter().find(|c| log.column(c).is_some()).unwrap_or("thrust_n"),
@@ -142,14 +143,16 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
 }
 
 /// A rig log as it is; anything else through the import.
-fn read(path: &Path) -> Result<Log, Failure> {
+fn read(path: &Path, quiet: bool) -> Result<Log, Failure> {
     let mut first = String::new();
     let file = std::fs::File::open(path).map_err(unread(&path))?;
     let _ = std::io::Read::take(BufReader::new(file), 64).read_line(&mut first); // what is no text the readers refuse
     if first.contains(FORMAT) {
         return Ok(Log::read(path)?);
     }
-    Ok(import(path, &[]).map_err(|why| crate::kind::another(path).map_or(why.into(), Failure::from))?.0)
+    let (log, report) = import(path, &[]).map_err(|why| crate::kind::another(path).map_or(why.into(), Failure::from))?;
+    found(path, &report).iter().filter(|_| !quiet).for_each(|line| note!("{line}"));
+    Ok(log)
 }
 
 fn stem(path: &Path) -> String {

@@ -129,10 +129,26 @@ fn exports_are_runs_and_a_bad_file_costs_one_line() {
     fs::write(folder.path().join("runs/broken.csv"), "# quadrig-log 1\nt_s,rpm,thrust_n\n0,1,x\n").unwrap();
     fs::write(folder.path().join("runs/notes.md"), "no run\n").unwrap();
     let said = call(folder.path(), &["history", "runs", "--json"]).succeeded();
-    assert_eq!(
-        said.err,
-        "left out: runs/broken.csv:3: column thrust_n: 'x'; expected a decimal number, or an empty field for a missing sample\n"
-    );
+    let broken =
+        "left out: runs/broken.csv:3: column thrust_n: 'x'; expected a decimal number, or an empty field for a missing sample\n";
+    assert!(said.err.ends_with(broken) && said.err.matches("left out").count() == 1, "{}", said.err);
+    // what was converted is said of each file, in one block
+    for seed in SEEDS {
+        let block = format!("runs/run{seed}.csv: read as an export; found on the way:\n  ");
+        assert_eq!(said.err.matches(&block).count(), 1, "{}", said.err);
+    }
+    assert_eq!(said.err.matches("Thrust (N)").count(), SEEDS.count(), "{}", said.err);
+    assert_eq!(call(folder.path(), &["--quiet", "history", "runs", "--json"]).succeeded().err, broken);
+
+    // a run that is laid beside another, and one whose levels are asked for, are no exception
+    let export = format!("runs/run{}.csv", SEEDS.end());
+    let own = flown().join("runs/run1.csv");
+    let beside = ["identify", own.to_str().unwrap(), "-o", "m.toml", "--report", "p.html", "--beside", &export];
+    for words in [&beside[..], &["beam", "--run", &export], &["plateaus", &export]] {
+        let said = call(folder.path(), words).succeeded();
+        assert_eq!(said.err.matches(&format!("{export}: read as an export; found on the way:\n")).count(), 1, "{}", said.err);
+        assert!(said.err.contains("Thrust (N)"), "{}", said.err);
+    }
     let told = json(&said);
     assert_eq!(
         (told["runs"].as_array().map(Vec::len), &told["changes"][0]["first"]),
