@@ -15,10 +15,13 @@ use crate::verdict::Channels;
 use crate::verdict::words::upper;
 use std::path::{Path, PathBuf};
 
-/// Most columns of a table that a phone shows as one.
-const NARROW: usize = 4;
 /// Letters of a word from which on four columns are too many for a phone.
 const LONG: usize = 8;
+/// Letters that a phone of 390 px has room for beside each other: 366 px at 7.9 px a letter.
+const ROOM: usize = 46;
+/// Letters that a column takes beyond its longest word (its padding), and that a column of text takes at least (9 rem).
+const PADDING: usize = 2;
+const TEXT: usize = 17;
 /// Most cells of a wider table whose rows a phone shows one under the other; a longer one keeps its first column in view and scrolls.
 const STACKED: usize = 600;
 /// Most rows of a table on a closed loop's page.
@@ -176,7 +179,20 @@ impl Sheet {
         let wide = |cell: &String| cell.split(' ').any(|word| word.chars().count() > LONG);
         // the first column has a line of its own on a phone, so that its title asks for no room
         let long = rows.iter().flatten().any(wide) || header.iter().skip(1).any(|name| wide(&(*name).to_owned()));
-        let narrow = header.len() < NARROW || (header.len() == NARROW && !long);
+        let longest = |cell: &str| cell.split(' ').map(|word| word.chars().count()).max().unwrap_or(0);
+        let asks = |k: usize| {
+            let cells = rows.iter().filter_map(|r| r.get(k)).map(|c| longest(c));
+            let word = cells.fold(longest(header[k]), usize::max);
+            PADDING + if texts[k] { word.max(TEXT) } else { word }
+        };
+        let fits = (0..header.len()).map(asks).sum::<usize>() <= ROOM;
+        // a phone shows so many columns as one table; of two the second breaks wherever it must
+        let narrow = match header.len() {
+            0..=2 => true,
+            3 => fits,
+            4 => !long,
+            _ => false,
+        };
         let stacked = self.told && !narrow && rows.len() * header.len() <= STACKED;
         self.body += &format!("<div class=\"wide\"><table{}><thead><tr>", if stacked { " class=\"stack\"" } else { "" });
         for (k, cell) in header.iter().enumerate() {
@@ -322,6 +338,21 @@ mod tests {
         };
         assert!(html(["channel", "05_171350", "07_174807", "09_181347"]).contains("class=\"stack\""));
         assert!(!html(["parameter", "value", "95 % interval", "unit"]).contains("class=\"stack\""));
+    }
+
+    /// Three columns stack on a phone where their words do not stand beside each other, and only there.
+    #[test]
+    fn three_columns_that_are_too_wide_stack_on_a_phone() {
+        let html = |titles: [&str; 3], row: [&str; 3]| {
+            let mut sheet = Sheet::told("a", "A page.");
+            sheet.data("names", &titles, &[row.map(str::to_owned).to_vec()], None);
+            sheet.html()
+        };
+        let names = ["Supply voltage sags with the current drawn", "0.67", "battery_discharge"];
+        assert!(html(["name", "probability", "effect"], names).contains("class=\"stack\""));
+        let digest = "0123456789abcdef".repeat(4);
+        assert!(html(["run", "log", "SHA-256"], ["run 1", "run1.csv", &digest]).contains("class=\"stack\""));
+        assert!(!html(["parameter", "value", "unit"], ["resistance", "0.0301(2)", "ohm"]).contains("class=\"stack\""));
     }
 
     #[test]
