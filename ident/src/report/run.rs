@@ -228,10 +228,17 @@ fn means(log: &Log, found: &Identified, channel: &str) -> Vec<Mark> {
     let unit = unit_of(channel);
     let mark = |(k, p): (usize, &Plateau)| {
         let (mean, se) = p.of(log, channel)?;
-        let text = format!("{}: {mean:.4} \u{b1} {:.4} {unit}, {} rows", k + 1, 1.96 * se, p.rows);
+        let text = format!("{}: {} {unit}, {} rows", k + 1, with_half(mean, 1.96 * se), p.rows);
         Some(Mark { x: 0.5 * (p.from_s + p.to_s), y: mean, error: 0.0, text })
     };
     found.plateaus.iter().enumerate().filter_map(mark).collect()
+}
+
+/// A value and half of its interval, both to the second digit of the half: in no unit is either told as nothing.
+fn with_half(v: f64, half: f64) -> String {
+    let second = if half > 0.0 { 1.0 - half.log10().floor() } else { 4.0 };
+    let places = second.clamp(0.0, 12.0) as usize;
+    format!("{v:.places$} \u{b1} {half:.places$}")
 }
 
 fn over_time(log: &Log, found: &Identified, channel: &str) -> Option<Figure> {
@@ -397,7 +404,7 @@ pub(super) fn relation(f: &Fitted) -> Figure {
                     x: at,
                     y: p.y,
                     error: 1.96 * p.y_error,
-                    text: format!("{at:.1} {}: {:.4} \u{b1} {:.4} {unit}", unit_of(f.x), p.y, 1.96 * p.y_error),
+                    text: format!("{at:.1} {}: {} {unit}", unit_of(f.x), with_half(p.y, 1.96 * p.y_error)),
                 }
             })
             .collect()

@@ -6,7 +6,7 @@
 //! Reference: specification `formats.md`, `quadrig import`; `identification.md`, item 6.
 
 use super::Report;
-use crate::log::{Gaps, Log};
+use crate::log::{Gaps, Log, trimmed};
 use crate::numeric::order::{median, quantum};
 
 /// A gap is longer than so many usual steps.
@@ -32,7 +32,7 @@ pub(super) fn inspect(log: &Log, report: &mut Report) {
         let (step, scatter) = (quantum(&present), scatter(&present));
         let distinct = distinct(&present);
         if column.name != "pulse_us" && step > 0.0 && distinct > 2 && (scatter == 0.0 || step > COARSE * scatter) {
-            report.add(&column.name, format!("distinct values: coarse steps of {step:.4} hide the noise"), distinct);
+            report.add(&column.name, format!("distinct values: coarse steps of {} hide the noise", few(step)), distinct);
         }
     }
 }
@@ -45,12 +45,25 @@ fn time_steps(log: &Log, report: &mut Report) {
     let usual = median(&mut steps.clone());
     let longest = steps.iter().copied().fold(0.0, f64::max);
     let uneven = steps.iter().filter(|s| (*s / usual - 1.0).abs() > 0.2).count();
-    report.add("t_s", format!("time steps more than a fifth off the usual {usual:.4} s: kept as they are"), uneven);
+    report.add("t_s", format!("time steps more than a fifth off the usual {} s: kept as they are", few(usual)), uneven);
     let gaps = steps.iter().filter(|s| **s > GAP * usual).count();
-    report.add("t_s", format!("gaps of more than {GAP:.0} steps, the longest {longest:.3} s: kept, nothing is filled in"), gaps);
+    report.add(
+        "t_s",
+        format!("gaps of more than {GAP:.0} steps, the longest {} s: kept, nothing is filled in", few(longest)),
+        gaps,
+    );
     if let Some(gaps) = Gaps::of(log) {
         report.add("t_s", gaps.to_string(), 1);
     }
+}
+
+/// Figures of a step that is told.
+const FIGURES: f64 = 4.0;
+
+/// A step to so many figures, however small it is.
+fn few(v: f64) -> String {
+    let places = FIGURES - 1.0 - v.abs().max(f64::MIN_POSITIVE).log10().floor();
+    trimmed(v, places.clamp(0.0, 300.0) as usize)
 }
 
 /// Isolated excursions of one or two samples.
@@ -118,5 +131,23 @@ mod tests {
         assert_eq!(of("t_s", "gaps"), Some(1));
         assert_eq!(of("voltage_v", "coarse steps of 0.1"), Some(12));
         assert_eq!(of("rpm", "coarse"), None);
+    }
+
+    /// A fine display in a large unit, a fast log: no step is told as nothing.
+    #[test]
+    fn a_small_step_keeps_its_digits() {
+        for (step, said) in [(2e-5, "0.00002"), (65.4, "65.4"), (0.1, "0.1"), (1.234_56e-7, "0.0000001235"), (12_345.6, "12346")]
+        {
+            assert_eq!(few(step), said);
+        }
+        let torque: Vec<f64> = (0..200).map(|i| 2e-5 * f64::from(i / 17 % 12)).collect();
+        let t = (0..200).map(|i| 2e-5 * f64::from(i + i / 3)).collect();
+        let log = Log { t, columns: vec![Column { name: "torque_nm".into(), values: torque }], ..Log::default() };
+        let mut report = Report::default();
+        inspect(&log, &mut report);
+        let said: Vec<&str> = report.notes.iter().map(|n| n.what.as_str()).collect();
+        for told in ["coarse steps of 0.00002 hide", "off the usual 0.00002 s"] {
+            assert!(said.iter().any(|what| what.contains(told)), "{said:?}");
+        }
     }
 }
