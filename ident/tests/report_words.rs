@@ -869,6 +869,7 @@ fn an_extrapolation_is_no_size_of_what_is_left() {
 /// A size that is true of no run is told with those of the runs.
 #[test]
 fn a_mean_of_runs_that_disagree_is_told_as_one() {
+        timeless: false,
     let mut lead = sag(0.995);
     lead.parameters[0].ci95 = [0.5 * lead.parameters[0].value, 1.5 * lead.parameters[0].value];
     lead.evidence += "; the runs disagree: alone they have 0.0799 to 0.200 ohm for the resistance";

@@ -18,7 +18,7 @@ use ident::identify::{Identified, identify, identify_in};
 use ident::log::Log;
 use ident::numeric::digits::number;
 use ident::plateau::so_many;
-use ident::report::{Sheet, WIDEST, headline, wrapped};
+use ident::report::{Sheet, WIDEST, headline, when, wrapped};
 use ident::verdict::words::{bracketed, channel, to_error};
 use std::path::PathBuf;
 
@@ -91,7 +91,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         written.push(path);
     }
     if !quiet {
-        crate::say::text(&(text(&found) + &told(&log)));
+        crate::say::text(&(text(&log, &found) + &told(&log)));
     }
     match (&args.surface, &found.surface) {
         (Some(path), Err(why)) => {
@@ -121,8 +121,8 @@ fn draw(args: &Args, log: &Log, found: &Identified, quiet: bool) -> Result<Sheet
     Ok(ident::report::run(log, found, second.as_ref().map(|(log, found)| (log, found))))
 }
 
-fn text(found: &Identified) -> String {
-    let mut out = format!("{}\n\n", wrapped(&headline(found), 0)) + &levels(found);
+fn text(log: &Log, found: &Identified) -> String {
+    let mut out = format!("{}\n\n", wrapped(&headline(found), 0)) + &levels(log, found);
     out += "\ndeclared relations over all rows (of the speed in 1000 rev/min; of the pulse above 1000 us in ms)\n";
     for p in &found.model.polynomials {
         let all = terms(p.coefficients.iter().copied().zip(p.errors.iter().map(|se| 1.96 * se)));
@@ -176,18 +176,19 @@ fn text(found: &Identified) -> String {
 const LEAST: usize = 14;
 
 /// The plateaus, a few channels at a time; channels without a reading are left out.
-fn levels(found: &Identified) -> String {
+fn levels(log: &Log, found: &Identified) -> String {
+    let ([from, to, _], places) = when(log);
+    let settle = if log.time_is_row() { "settle" } else { "settle s" };
+    let [from, to] = [from, to].map(|title| title.replace(',', ""));
     let mut out = format!(
-        "{} as read (in brackets: half of the 95 % interval, in units of the last digit)\n{:>3}{:>9}{:>9}{:>7}{:>10}\n",
+        "{} as read (in brackets: half of the 95 % interval, in units of the last digit)\n{:>3}{from:>9}{to:>9}{:>7}{settle:>10}\n",
         so_many(found.plateaus.len()),
         "",
-        "from s",
-        "to s",
-        "rows",
-        "settle s"
+        "rows"
     );
     for (n, p) in found.plateaus.iter().enumerate() {
-        out += &format!("{:>3}{:>9.2}{:>9.2}{:>7}{:>10.2}\n", n + 1, p.from_s, p.to_s, p.rows, p.settling_s);
+        let [from, to, settles] = [p.from_s, p.to_s, p.settling_s].map(|v| format!("{v:.places$}"));
+        out += &format!("{:>3}{from:>9}{to:>9}{:>7}{settles:>10}\n", n + 1, p.rows);
     }
     let read = |k: &usize| found.plateaus.iter().any(|p| p.means[*k].is_some());
     let columns: Vec<usize> = (0..found.columns.len()).filter(read).collect();
@@ -276,4 +277,31 @@ fn terms(pairs: impl Iterator<Item = (f64, f64)>) -> String {
         .map(|(k, (c, e))| format!("c{k} = {}", bracketed(c, e).unwrap_or_else(|| number(c))))
         .collect::<Vec<_>>()
         .join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write;
+
+    /// A staircase of five levels.
+    fn staircase(head: &str, step: f64) -> Log {
+        let mut csv = format!("# quadrig-log 1\n{head}t_s,pulse_us,rpm,thrust_n\n");
+        for i in 0..600 {
+            let wave = f64::from(i * i % 97) / 97.0;
+            let (pulse, rpm) = (1200 + 100 * (i / 120), 1400.0 + 700.0 * f64::from(i / 120) + 4.0 * wave);
+            let _ = writeln!(csv, "{},{pulse},{rpm},{}", step * f64::from(i), 1e-7 * rpm * rpm + 0.01 * wave);
+        }
+        Log::parse("run.csv", csv.as_bytes()).expect("a log")
+    }
+
+    /// Rows without a time are told as rows.
+    #[test]
+    fn plateaus_of_a_log_without_a_time_are_told_in_rows() {
+        let told = |log: &Log| text(log, &identify(log).expect("levels"));
+        let (timed, rows) = (told(&staircase("", 0.1)), told(&staircase("# time = \"row\"\n", 1.0)));
+        assert!(timed.contains("   from s     to s   rows  settle s\n"), "{timed}");
+        assert!(rows.contains(" from row   to row   rows    settle\n") && rows.contains("      119    120 "), "{rows}");
+        assert!(!rows.contains(" s\n") && !rows.contains(" s "), "{rows}");
+    }
 }

@@ -116,7 +116,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         crate::say::text(&table(&report));
         joined.iter().flat_map(|j| &j.reports).for_each(|r| crate::say::text(&table(r)));
         let columns = log.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(" ");
-        let told = format!("{} rows, {:.3} s, columns t_s {columns}", log.len(), log.t[log.len() - 1] - log.t[0]);
+        let seconds = log.t[log.len() - 1] - log.t[0];
+        let time = if log.time_is_row() { "no time (t_s is the row)".to_owned() } else { format!("{seconds:.3} s") };
+        let told = format!("{} rows, {time}, columns t_s {columns}", log.len());
         say!("{}", wrapped(&told, 2));
     }
     Ok(())

@@ -100,7 +100,7 @@ fn flown(hidden: &[String]) -> String {
 
 /// The matrix as a person reads it.
 fn text(found: &Isolability) -> String {
-    let mut out = format!("{}: {} rows, {:.0} s\n{}", found.run, found.rows, found.duration_s, line(&found.summary(), 0));
+    let mut out = format!("{}: {}\n{}", found.run, found.length(), line(&found.summary(), 0));
     if !found.found.is_empty() {
         out += &line(&format!("The log as it is holds {}; they stay in it.", found.found.join(", ")), 0);
     }

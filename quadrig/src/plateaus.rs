@@ -225,7 +225,7 @@ fn draw(folder: &mut Folder, path: &Path, log: &Log, channel: &str, f: &Filters,
         table(&mut text, log, channel, f)?;
         folder.add(format!("{name}-filters.csv"), text);
     }
-    let mut figures = filter_figures(&log.t, f, channel);
+    let mut figures = filter_figures(log, f, channel);
     figures.iter_mut().for_each(|figure| figure.id = format!("{name}-{}", figure.id));
     if let (Some([known]), Some(values)) = (Known::from_command(log, [channel]), log.column(channel)) {
         figures.extend(study_figures(&threshold_study(values, &known, Form::Published), channel, &name));

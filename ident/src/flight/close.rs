@@ -324,6 +324,7 @@ impl<'w> Whole<'w> {
             recurs: false,
             silent: false,
             stuck: false,
+            timeless: false,
         });
         Verdict {
             format: FORMAT,

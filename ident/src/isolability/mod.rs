@@ -111,8 +111,8 @@ pub struct Isolability {
     pub run: String,
     /// Rows, and length in s.
     pub rows: usize,
-    /// Length, s.
-    pub duration_s: f64,
+    /// Length, s; nothing where the rows have no time.
+    pub duration_s: Option<f64>,
     /// Measured channels with their noise floors and units.
     pub channels: Vec<(String, f64, &'static str)>,
     /// The causes, those that are named at the smallest size first.
@@ -123,6 +123,15 @@ pub struct Isolability {
     pub not_offered: Vec<&'static str>,
     /// What the search names on the log as it is: it stays in the log, beside every cause but itself.
     pub found: Vec<String>,
+}
+
+impl Isolability {
+    /// How long the run is: its rows, and their time where they have one.
+    #[must_use]
+    pub fn length(&self) -> String {
+        let time = self.duration_s.map_or_else(|| " without a time".to_owned(), |s| format!(" in {s:.0} s"));
+        format!("{} rows{time}", self.rows)
+    }
 }
 
 /// Asks about every cause. `progress` hears a share of the work done, 0 to 1.
@@ -148,7 +157,7 @@ pub fn isolability(log: &Log, progress: &mut dyn FnMut(f64)) -> Result<Isolabili
     Ok(Isolability {
         run: log.name.clone(),
         rows: log.len(),
-        duration_s: context.duration(),
+        duration_s: (!context.time_is_row).then(|| context.duration()),
         channels: channels.map(|t| (t.name.to_owned(), t.noise.rms, crate::channel::unit_of(t.name))).collect(),
         causes,
         groups,

@@ -68,14 +68,18 @@ pub struct Flagged {
     pub words: String,
     /// Samples that carry it.
     pub samples: usize,
-    /// Time of the first and of the last, s.
+    /// Time of the first and of the last, s; rows where the log has no time.
     pub span_s: (f64, f64),
+    /// Of a log without a time.
+    pub timeless: bool,
 }
 
 impl fmt::Display for Flagged {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { channel, words, samples, span_s: (from, to), .. } = self;
         match samples {
+            1 if self.timeless => write!(f, "{channel}: {words} in row {from:.0}"),
+            _ if self.timeless => write!(f, "{channel}: {words} in {samples} samples of rows {from:.0} to {to:.0}"),
             1 => write!(f, "{channel}: {words} in a sample at {from:.3} s"),
             _ => write!(f, "{channel}: {words} in {samples} samples from {from:.3} to {to:.3} s"),
         }
@@ -100,6 +104,7 @@ pub fn flagged(log: &Log) -> Vec<Flagged> {
                     words: words(log, number),
                     samples: 1,
                     span_s: (*t, *t),
+                    timeless: log.time_is_row(),
                 }),
             }
         }

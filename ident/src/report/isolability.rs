@@ -23,7 +23,7 @@ const ROW: f64 = 19.0;
 #[must_use]
 pub fn isolability(found: &Isolability, from: &[(&str, String)]) -> Sheet {
     let mut sheet = Sheet::told(&format!("Which causes can {} tell apart?", found.run), &found.summary());
-    sheet.soft(&format!("{} - {} rows in {:.0} s", found.run, found.rows, found.duration_s));
+    sheet.soft(&format!("{} - {}", found.run, found.length()));
     if !found.found.is_empty() {
         sheet.say(&format!(
             "The log as it is holds {}. They stay in it, each beside every cause but itself.",

@@ -34,7 +34,7 @@ pub use figure::{Figure, Layer, Mark};
 pub use history::{page as history_page, terminal as history_terminal};
 pub use isolability::{isolability, isolability_csv, isolability_svg};
 pub use page::closed_loop;
-pub use run::{headline, run};
+pub use run::{headline, run, when};
 pub use selection::{selection, tenths};
 pub use several::several;
 pub use sheet::{Sheet, write_figures};

@@ -205,7 +205,7 @@ fn across(shown: &Shown) -> Trace {
         channel: shown.channel.to_owned(),
         unit: unit_of(shown.channel).to_owned(),
         floor: shown.floor,
-        time_label: "time, s".to_owned(),
+        time_label: over(shown.timeless),
         t: shown.t.clone(),
         before: shown.before.clone(),
         after: shown.after.clone(),
@@ -546,7 +546,12 @@ fn identified(sheet: &mut Sheet, log: &Log, closed: &Closed) {
 }
 
 fn time_label(context: &Context) -> String {
-    if context.time_is_row { "row".to_owned() } else { "time, s".to_owned() }
+    over(context.time_is_row)
+}
+
+/// Label of an axis of time, of a log without one too.
+fn over(timeless: bool) -> String {
+    if timeless { "row" } else { "time, s" }.to_owned()
 }
 
 /// Label of an axis under a title that names the channel: its unit.
@@ -625,6 +630,7 @@ mod tests {
             recurs: false,
             silent: false,
             stuck: false,
+            timeless: false,
         };
         let mut v = parts::bare_verdict(Vec::new());
         assert_eq!(counted(&log, &v, &e), None);

@@ -182,7 +182,7 @@ fn hardly(c: &Constant) -> &'static str {
     }
 }
 
-fn time_label(log: &Log) -> String {
+pub(super) fn time_label(log: &Log) -> String {
     if log.time_is_row() { "row" } else { "time, s" }.to_owned()
 }
 
@@ -340,7 +340,7 @@ fn differences(log: &Log, plateaus: &[Plateau]) -> Option<Figure> {
 fn binary_shift(log: &Log, found: &Identified) -> Vec<Figure> {
     let Some((channel, values)) = SPEED.iter().find_map(|c| Some((*c, log.column(c)?))) else { return Vec::new() };
     let f = filters(values, &Settings::default());
-    let mut figures = filter_figures(&log.t, &f, channel);
+    let mut figures = filter_figures(log, &f, channel);
     for figure in &mut figures {
         figure.id = format!("binary-shift-{}", figure.id);
         figure.x_label = time_label(log);
@@ -499,9 +499,15 @@ fn side_by_side(a: (&Log, &Identified), b: (&Log, &Identified)) -> Vec<Figure> {
     out
 }
 
+/// Titles of the columns that tell where a plateau begins and ends and how long it settles, and their decimals.
+#[must_use]
+pub fn when(log: &Log) -> ([&'static str; 3], usize) {
+    if log.time_is_row() { (["from row", "to row", "settling, rows"], 0) } else { (["from, s", "to, s", "settling, s"], 2) }
+}
+
 pub(super) fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
-    let mut header =
-        vec!["plateau".to_owned(), "from, s".to_owned(), "to, s".to_owned(), "settling, s".to_owned(), "rows".to_owned()];
+    let (names, places) = when(log);
+    let mut header: Vec<String> = std::iter::once("plateau").chain(names).chain(["rows"]).map(str::to_owned).collect();
     // what no plateau has a mean of stands in the file alone
     let has = |k: &usize| found.plateaus.iter().any(|p| p.means.get(*k).is_some_and(Option::is_some));
     let shown: Vec<usize> = (0..log.columns.len()).filter(has).collect();
@@ -513,9 +519,9 @@ pub(super) fn plateaus(sheet: &mut Sheet, log: &Log, found: &Identified) {
         .map(|(k, p)| {
             let mut row = vec![
                 (k + 1).to_string(),
-                format!("{:.2}", p.from_s),
-                format!("{:.2}", p.to_s),
-                format!("{:.2}", p.settling_s),
+                format!("{:.places$}", p.from_s),
+                format!("{:.places$}", p.to_s),
+                format!("{:.places$}", p.settling_s),
                 p.rows.to_string(),
             ];
             let mean = |k: &usize| p.means[*k].map_or_else(|| "-".to_owned(), |(v, se)| paired(v, se));
@@ -631,6 +637,27 @@ mod tests {
         let columns = std::iter::once(("pulse_us", pulse)).chain(speeds).chain([("thrust_n", thrust)]);
         let columns = columns.map(|(name, values)| Column { name: name.to_owned(), values }).collect();
         Log { name: "run.csv".to_owned(), t, columns, ..Log::default() }
+    }
+
+    /// Rows without a time are told as rows, in tables and on axes.
+    #[test]
+    fn without_a_time_a_page_says_rows() {
+        let timed = staircase(&["rpm_beam", "rpm_encoder"]);
+        let t = (0..timed.len()).map(|i| i as f64).collect();
+        let rows = Log { meta: [("time".to_owned(), "row".into())].into(), t, ..timed.clone() };
+        let page = |log: &Log| run(log, &identify(log).expect("a log"), None).html();
+        let (timed, rows) = (page(&timed), page(&rows));
+        for (seconds, told) in [("<th>from, s</th><th>to, s</th><th>settling, s</th>", "<th>from row</th><th>to row</th>")] {
+            assert!(timed.contains(seconds) && !timed.contains(told));
+            assert!(rows.contains(told) && !rows.contains(", s<"), "{}", &rows[rows.find(", s<").unwrap_or(0)..][..200]);
+        }
+    }
+
+    #[test]
+    fn a_value_in_a_large_unit_keeps_its_digits() {
+        assert_eq!(with_half(2.34e-5, 1.26e-6), "0.0000234 \u{b1} 0.0000013");
+        assert_eq!(with_half(5563.24, 0.42), "5563.24 \u{b1} 0.42");
+        assert_eq!(with_half(-1.0, 0.0), "-1.0000 \u{b1} 0.0000");
     }
 
     /// Two speed sensors share a drawing, with how they differ beneath; one has a drawing of its own.

@@ -6,19 +6,22 @@
 //! Reference: Beharie 2013, Figures 5.65 to 5.71 (filters) and 5.82 to 5.84 (thresholds).
 
 use super::figure::{Figure, Layer};
+use super::run::time_label;
 use crate::channel::unit_of;
+use crate::log::Log;
 use crate::plateau::shift::Filters;
 use crate::plateau::study::{OFFSETS, Tried};
 use crate::verdict::words;
 
 /// Filters 2 to 6 one above the other over time, and Filter 1 with its threshold.
 #[must_use]
-pub fn filter_figures(t: &[f64], f: &Filters, channel: &str) -> Vec<Figure> {
+pub fn filter_figures(log: &Log, f: &Filters, channel: &str) -> Vec<Figure> {
+    let t = log.t.as_slice();
     let per = format!("{} per sample", unit_of(channel));
     let one = Figure {
         id: "filter-1".into(),
         title: format!("Filter 1 of {}", words::channel(channel)),
-        x_label: "time, s".into(),
+        x_label: time_label(log),
         y_label: per,
         layers: vec![
             Layer::Line { name: "|x[n+1] - x[n]|".into(), class: "a", x: t[..f.one.len()].to_vec(), y: f.one.clone() },
@@ -43,7 +46,7 @@ pub fn filter_figures(t: &[f64], f: &Filters, channel: &str) -> Vec<Figure> {
     let logic = Figure {
         id: "filters-2-to-6".into(),
         title: format!("Filters 2 to 6 of {}, offset {} samples", words::channel(channel), f.offset),
-        x_label: "time, s".into(),
+        x_label: time_label(log),
         y_label: "off - on, stacked".into(),
         layers,
         ..Figure::default()

@@ -58,8 +58,10 @@ pub struct Shown {
     pub channel: &'static str,
     /// Noise floor.
     pub floor: f64,
-    /// Time, s.
+    /// Time, s; rows where the log has no time.
     pub t: Vec<f64>,
+    /// Of a log without a time.
+    pub timeless: bool,
     /// Measured less predicted by the declared model, one constant apart.
     pub before: Vec<f64>,
     /// The same by the corrected model.
@@ -90,6 +92,7 @@ fn shown_on(tenable: &Tenable<'_>, (run, channel): (usize, &'static str), fewer:
         channel,
         floor: target.noise.rms,
         t: target.rows.iter().filter(|row| target.claims(**row)).map(|row| member.context.t[*row]).collect(),
+        timeless: member.context.time_is_row,
         before: left(fewer, &Joint::of(members).without(run).shared(fewer))?,
         after: left(&fold.rig, &fold.shared)?,
     })

@@ -55,15 +55,19 @@ pub struct SetAside {
     /// The same reading row after row, and not nothing.
     #[serde(skip)]
     pub stuck: bool,
+    /// Of a log without a time: its row is all that is known of when.
+    #[serde(skip)]
+    pub timeless: bool,
 }
 
 impl fmt::Display for SetAside {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { channel, row, rows, t_s, until_s, .. } = self;
-        let place = if *rows == 1 {
-            format!("row {row} ({t_s:.3} s)")
-        } else {
-            format!("{rows} rows from {row} on ({t_s:.3} to {until_s:.3} s)")
+        let place = match (*rows, self.timeless) {
+            (1, true) => format!("row {row}"),
+            (1, false) => format!("row {row} ({t_s:.3} s)"),
+            (_, true) => format!("{rows} rows from {row} on"),
+            (_, false) => format!("{rows} rows from {row} on ({t_s:.3} to {until_s:.3} s)"),
         };
         write!(f, "column {channel}, {place}: {}; set aside", self.off())
     }
@@ -272,6 +276,7 @@ fn told(log: &Log, name: &str, column: &[f64], event: &Event) -> Option<SetAside
         recurs: false,
         silent: event.silent,
         stuck,
+        timeless: log.time_is_row(),
     })
 }
 
@@ -279,11 +284,25 @@ fn told(log: &Log, name: &str, column: &[f64], event: &Event) -> Option<SetAside
 mod tests {
     use super::*;
 
-    fn aside(value: f64, expected: f64, stuck: bool) -> String {
+    fn one(value: f64, expected: f64, stuck: bool) -> SetAside {
         let (channel, rows) = ("rpm_beam".to_owned(), if stuck { 12 } else { 1 });
-        let one =
-            SetAside { channel, row: 1, rows, t_s: 0.1, until_s: 0.1, value, expected, recurs: false, silent: false, stuck };
-        one.to_string()
+        let [recurs, silent, timeless] = [false; 3];
+        SetAside { channel, row: 1, rows, t_s: 0.1, until_s: 0.1, value, expected, recurs, silent, stuck, timeless }
+    }
+
+    fn aside(value: f64, expected: f64, stuck: bool) -> String {
+        one(value, expected, stuck).to_string()
+    }
+
+    /// A log whose rows have no time tells rows.
+    #[test]
+    fn without_a_time_a_reading_has_its_row_alone() {
+        for (stuck, place, timed) in [(false, "row 1", " (0.100 s)"), (true, "12 rows from 1 on", " (0.100 to 0.100 s)")] {
+            for (timeless, behind) in [(true, ""), (false, timed)] {
+                let said = SetAside { timeless, ..one(0.0, 511.0, stuck) }.to_string();
+                assert!(said.starts_with(&format!("column rpm_beam, {place}{behind}: ")), "{said}");
+            }
+        }
     }
 
     #[test]

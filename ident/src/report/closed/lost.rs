@@ -97,7 +97,8 @@ mod tests {
 
     fn aside(channel: &str, rows: usize, value: f64) -> SetAside {
         let (channel, expected) = (channel.to_owned(), 4000.0);
-        SetAside { channel, row: 7, rows, t_s: 0.7, until_s: 0.8, value, expected, recurs: false, silent: false, stuck: false }
+        let [recurs, silent, stuck, timeless] = [false; 4];
+        SetAside { channel, row: 7, rows, t_s: 0.7, until_s: 0.8, value, expected, recurs, silent, stuck, timeless }
     }
 
     fn faulty() -> Verdict {
