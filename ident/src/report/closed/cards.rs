@@ -6,6 +6,7 @@
 //! Reference: specification `formats.md`, "Verdict" (`effects`, `alternatives`).
 
 use super::contest::{Rival, reserve, rivals};
+use super::left::goes_with;
 use super::lost;
 use super::page::{Page, Reading};
 use super::sentence::{order, without};
@@ -175,7 +176,8 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     };
     let rather = if nameless { None } else { leading(page, e, &against) };
     let title = match &rather {
-        _ if nameless => format!("Something on {on} that goes with {}.", channels(&e.depends_on)),
+        _ if nameless && goes_with(e).is_empty() => format!("Something on {on} that nothing in the log predicts."),
+        _ if nameless => format!("Something on {on} that goes with {}.", channels(goes_with(e))),
         Some(both) => both.clone(),
         None => lost::said(v, page.words, e).sentence(),
     };

@@ -87,16 +87,38 @@ pub(super) fn shared(v: &Verdict) -> Option<String> {
     (v.unexplained.len() > 1 && tails.all(|tail| tail == Some(first))).then(|| first.to_owned())
 }
 
-/// What a remainder looks like, without what is said of all, and what it seems to go with.
-pub(super) fn looks_and_goes(u: &Unexplained, shared: Option<&str>) -> (String, String) {
+/// What a term without a name was fitted over, where left-out rows bear it out: cards, sentence and what is left say the same.
+pub(super) fn goes_with(e: &EffectEntry) -> &[String] {
+    if e.id == "unknown" && e.heldout_error_reduction > 0.0 { &e.depends_on } else { &[] }
+}
+
+/// The same of all such terms, of all channels or of one.
+pub(super) fn fitted_over<'v>(v: &'v Verdict, on: Option<&'v str>) -> impl Iterator<Item = &'v String> {
+    let of = move |e: &&EffectEntry| on.is_none_or(|on| e.channels.iter().any(|c| c == on));
+    v.effects.iter().filter(of).flat_map(goes_with)
+}
+
+/// What a remainder looks like, without what is said of all, and what it seems to go with, behind what was fitted on its channel.
+pub(super) fn looks_and_goes(v: &Verdict, u: &Unexplained, shared: Option<&str>) -> (String, String) {
+    let (looks, beyond) = looks_and_goes_beyond(v, u, shared);
+    let mut fitted: Vec<String> = fitted_over(v, Some(&u.channel)).map(|name| channel(name)).collect();
+    fitted.dedup();
+    let goes = if fitted.is_empty() { beyond } else { format!("{} (fitted without a name); beyond it {beyond}", list(&fitted)) };
+    (looks, goes)
+}
+
+/// The same of what is left behind what was fitted.
+fn looks_and_goes_beyond(v: &Verdict, u: &Unexplained, shared: Option<&str>) -> (String, String) {
     let own =
         shared.and_then(|tail| u.looks_like.strip_suffix(tail)).map_or(u.looks_like.as_str(), |own| own.trim_end_matches("; "));
     let (goes, looks): (Vec<&str>, Vec<&str>) = own.split("; ").partition(|part| part.starts_with("goes with "));
-    let seen: Vec<String> = u.depends_on.iter().map(|d| channel(d)).collect();
+    let further = u.depends_on.iter().filter(|name| fitted_over(v, Some(&u.channel)).all(|fitted| fitted != *name));
+    let seen: Vec<String> = further.map(|d| channel(d)).collect();
     let goes = match (seen.as_slice(), goes.first()) {
         ([], Some(part)) => part.trim_start_matches("goes with ").to_owned(),
         // what it looks like says so
         ([], None) if own.contains("grows with the load") => "the load".to_owned(),
+        ([], None) if !u.depends_on.is_empty() => format!("{} still", channels(&u.depends_on)),
         ([], None) => "nothing in the log".to_owned(),
         (with, _) => with.join(", "),
     };
@@ -108,7 +130,7 @@ fn alike(v: &Verdict, told: &[&Unexplained], shared: Option<&str>) -> Vec<Vec<St
     let mut groups: Vec<Vec<&Unexplained>> = Vec::new();
     let same = |a: &Unexplained, b: &Unexplained| {
         let is_axis = vector(&a.channel) != channel(&a.channel);
-        is_axis && vector(&a.channel) == vector(&b.channel) && looks_and_goes(a, shared) == looks_and_goes(b, shared)
+        is_axis && vector(&a.channel) == vector(&b.channel) && looks_and_goes(v, a, shared) == looks_and_goes(v, b, shared)
     };
     for u in told {
         match groups.iter_mut().find(|g| g.first().is_some_and(|first| same(first, u))) {
@@ -118,7 +140,7 @@ fn alike(v: &Verdict, told: &[&Unexplained], shared: Option<&str>) -> Vec<Vec<St
     }
     let row = |group: &Vec<&Unexplained>| {
         let first = group.first()?;
-        let (looks, goes) = looks_and_goes(first, shared);
+        let (looks, goes) = looks_and_goes(v, first, shared);
         let (up_to, name) = match group.len() {
             1 => ("", heading(&first.channel)),
             _ => ("up to ", upper(&channels(&group.iter().map(|u| u.channel.clone()).collect::<Vec<_>>()))),
@@ -257,15 +279,36 @@ mod tests {
 
     #[test]
     fn a_memory_is_a_time_constant() {
-        let said = looks_and_goes(&left("acc_x", "slow, within 2.0 s; goes with time"), None).0;
+        let v = bare_verdict(Vec::new());
+        let said = looks_and_goes(&v, &left("acc_x", "slow, within 2.0 s; goes with time"), None).0;
         assert_eq!(said, "slow, with a time constant of 2.0 s");
     }
 
     /// What a short table cannot prove it says as far as it goes, where a reader looks for it.
     #[test]
     fn what_it_seems_to_go_with_stands_in_its_column() {
-        let said = looks_and_goes(&left("voltage_v", "over several rows; goes with current, as far as 36 rows can show"), None);
+        let v = bare_verdict(Vec::new());
+        let short = left("voltage_v", "over several rows; goes with current, as far as 36 rows can show");
+        let said = looks_and_goes(&v, &short, None);
         assert_eq!(said, ("over several rows".to_owned(), "current, as far as 36 rows can show".to_owned()));
-        assert_eq!(looks_and_goes(&left("voltage_v", "slow"), None).1, "nothing in the log");
+        assert_eq!(looks_and_goes(&v, &left("voltage_v", "slow"), None).1, "nothing in the log");
+    }
+
+    /// What a card says that something goes with is not told as going with nothing in the next section.
+    #[test]
+    fn what_was_fitted_without_a_name_is_told_of_what_is_left_too() {
+        let channels = vec!["current_a".to_owned()];
+        let depends_on = vec!["pulse_us".into()];
+        let term = EffectEntry { channels, depends_on, heldout_error_reduction: 0.2, ..bare_entry("unknown") };
+        let v = Verdict { effects: vec![term], ..bare_verdict(Vec::new()) };
+        let goes = |u: &Unexplained| looks_and_goes(&v, u, None).1;
+        let of = |depends_on: &[&str]| Unexplained {
+            depends_on: depends_on.iter().map(|name| (*name).to_owned()).collect(),
+            ..left("current_a", "slow")
+        };
+        assert_eq!(goes(&of(&[])), "pulse (fitted without a name); beyond it nothing in the log");
+        assert_eq!(goes(&of(&["pulse_us", "voltage_v"])), "pulse (fitted without a name); beyond it voltage");
+        assert_eq!(goes(&of(&["pulse_us"])), "pulse (fitted without a name); beyond it pulse still");
+        assert_eq!(goes(&left("thrust_n", "slow")), "nothing in the log");
     }
 }

@@ -7,7 +7,7 @@
 
 use super::cards::{is_shown, value};
 use super::contest::{Rival, is_beaten, rivals};
-use super::left::fitted;
+use super::left::{fitted, fitted_over};
 use super::lost;
 use super::vocabulary::Vocabulary;
 use crate::attribution::rivals::beyond;
@@ -323,8 +323,7 @@ fn unattributed(verdict: &Verdict, news: bool) -> String {
     let elsewhere = loudest(verdict).filter(|u| !on.iter().any(|c| quantity(c) == quantity(&u.channel)));
     on = on.iter().map(|c| channel(c)).collect();
     on.dedup();
-    let mut goes: Vec<String> =
-        corrections.iter().filter(|e| e.heldout_error_reduction > 0.0).flat_map(|e| &e.depends_on).map(|v| channel(v)).collect();
+    let mut goes: Vec<String> = fitted_over(verdict, None).map(|v| channel(v)).collect();
     goes.dedup();
     // what is largest stands first, also where it was on another channel that a curve helped
     if let Some(loudest) = elsewhere {

@@ -191,8 +191,9 @@ fn left(verdict: &Verdict) -> String {
     let mut out = String::from("\nwhat is left\n");
     let shared = shared(verdict);
     for u in verdict.unexplained.iter().filter(|u| !verdict.channels.not_predicted.contains_key(&u.channel)) {
-        let (looks, goes) = looks_and_goes(u, shared.as_deref());
-        let silent = goes == "nothing in the log" || looks.contains("grows with the load") && u.depends_on.is_empty();
+        let (looks, goes) = looks_and_goes(verdict, u, shared.as_deref());
+        // what it looks like says so
+        let silent = goes == "nothing in the log" || goes == "the load" && looks.contains("grows with the load");
         let on = if silent { String::new() } else { format!(", goes with {goes}") };
         let of = [channel(&u.channel), size_told(verdict, u), format!("{:.1} noise floors", floors_left(verdict, u))];
         let [name, size, floors] = of;
