@@ -605,6 +605,34 @@ fn sizes_have_no_sign() {
     };
     for (id, name, unit, up, down) in [
         ("zero_drift", "rate", "N/s", "drifts up by 1.20 N a minute", "drifts down by 1.20 N a minute"),
+/// The head of a page has two lines; causes that these have no room for stand in the paragraph beneath.
+#[test]
+fn a_head_holds_as_many_causes_as_two_lines_do() {
+    let effects = || {
+        let sized =
+            |id: &str, on: &str, name: &str, unit: &str| effect(id, on, 0.95, 0.9, vec![parameter(name, 0.5, 0.01, unit)]);
+        vec![
+            sized("supply_sag", "voltage_v", "resistance", "ohm"),
+            sized("channel_filter", "thrust_n", "window", "s"),
+            sized("channel_delay", "current_a", "delay", "s"),
+        ]
+    };
+    let said = |n: usize, news: bool| {
+        let mut v = verdict(Kind::Attributed, vec![]);
+        v.effects = effects().into_iter().take(n).collect();
+        let said = sentence(&v, Vocabulary::RIG, news);
+        let (head, rest) = said.split_once(". ").map_or((said.as_str(), ""), |(head, rest)| (head, rest));
+        (head.to_owned(), rest.to_owned())
+    };
+    let (short, rest) = said(2, false);
+    assert!(short.contains(", and ") && !rest.contains("Beside that"), "{short} | {rest}");
+    for (n, news, further) in [(3, false, "Beside that, "), (3, true, "New as well: ")] {
+        let (head, rest) = said(n, news);
+        assert!(head.chars().count() < 130 && rest.starts_with(further), "{head} | {rest}");
+    }
+}
+
+/// A size is told without its sign: a word tells the direction.
         ("tare_shift", "offset", "N", "jumps up by 0.0200 N", "jumps down by 0.0200 N"),
         ("gain_change", "gain_change", "1", "rises by 2.00 %", "falls by 2.00 %"),
         ("blade_damage", "thrust_change", "1", "adds 2.00 % of the thrust", "takes 2.00 % of the thrust"),

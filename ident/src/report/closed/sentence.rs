@@ -31,6 +31,8 @@ const ALL: f64 = 0.995;
 const MOST_BARE: usize = 2;
 /// Words of a head above which the share that an open question leaves explained is told in fewest words.
 const LONGEST: usize = 60;
+/// Letters of a head of two lines, 1400 px wide: it is set in letters of some 15 px, in lines of 1024 px.
+const HEAD: usize = 130;
 /// Share of a channel's error below which most of it is still there.
 const HALF: f64 = 0.5;
 /// Noise floors up to which what is left is not worth a word.
@@ -124,7 +126,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
             since(news, &format!("nothing of this {noun}'s own was named.")),
             joined_lower(&clauses)
         ),
-        false => format!("{}.", since(news, &joined_lower(&clauses))),
+        false => headlong(&clauses, news),
     };
     let explained = explained(verdict, &told, false, news);
     // what says that more is told below has said so
@@ -145,6 +147,18 @@ fn headed<'v>(verdict: &Verdict, likely: &[&'v EffectEntry]) -> Vec<&'v EffectEn
     let is_apart = |e: &&&EffectEntry| {
         shown_by_readings(e) || e.heldout_error_reduction > HALF && !on(e).iter().any(|quantity| taken.contains(quantity))
     };
+/// Clauses as a sentence that two lines of a head hold, and as many as that has no room for in a second one.
+fn headlong(clauses: &[String], news: bool) -> String {
+    let head = |n: usize| format!("{}.", since(news, &joined_lower(&clauses[..n])));
+    let fits = (1..=clauses.len()).rev().find(|n| head(*n).chars().count() <= HEAD).unwrap_or(1.min(clauses.len()));
+    let rest = joined_lower(&clauses[fits..]);
+    match (rest.is_empty(), news) {
+        (true, _) => head(fits),
+        (false, true) => format!("{} New as well: {rest}.", head(fits)),
+        (false, false) => format!("{} Beside that, {rest}.", head(fits)),
+    }
+}
+
     first.iter().chain(rest.iter().find(is_apart)).copied().collect()
 }
 
