@@ -409,7 +409,7 @@ fn a_cause_has_a_size_or_a_bound() {
         Vocabulary::RIG,
         false,
     );
-    assert!(said.starts_with("The supply lead sags with the current (resistance: up to 0.21 ohm)."), "{said}");
+    assert!(said.starts_with("The supply lead probably sags with the current (resistance: up to 0.21 ohm)."), "{said}");
 }
 
 /// What may be of either sign has no direction and no size: it changes, and the interval stands on the card alone.

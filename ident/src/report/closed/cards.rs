@@ -163,16 +163,18 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     let Some(k) = group.first().copied() else { return };
     let (v, e) = (page.verdict, &page.verdict.effects[k]);
     let on = channels_of(v, group);
-    let there = if open_sizes(e).is_some() { " that it is there" } else { "" };
+    let zero = zero_in(page.words, e);
+    let told = e.told_probability() < e.probability;
+    let there = if open_sizes(e).is_some() || !zero.is_empty() && !told { " that it is there" } else { "" };
     // what has no name is sure of nothing but that something is there
     let nameless = e.id == "unknown";
-    let sure = if nameless { "unsure" } else { sureness(e.probability) };
+    let sure = if nameless { "unsure" } else { sureness(e.told_probability()) };
     let against = rivals(v, page.words, k);
     let chip = if nameless {
         format!("no name; {}", that_it_is_there(e.probability))
     } else {
         let none = Rival::none(v, page.words, e, &against).probability;
-        contest(e, &format!("{sure}{there}"), &against, none)
+        contest(e, &format!("{sure}{there}"), &against, none) + &zero
     };
     let rather = if nameless { None } else { leading(page, e, &against) };
     let title = match &rather {
@@ -264,6 +266,21 @@ fn contest(e: &EffectEntry, sure: &str, against: &[Rival], none: f64) -> String 
         None if none >= OPEN => format!("{sure}: p {p}, other names or none {}", equals(&probability(none))),
         None if e.of_no_run().is_some() => format!("{sure}: p {p}, no rival; its size differs from run to run"),
         None => format!("{sure}: p {p}, no rival"),
+    }
+}
+
+/// Which sizes may be zero by their intervals, behind how sure a name is; where a sentence of its own counts them nothing.
+fn zero_in(words: Vocabulary, e: &EffectEntry) -> String {
+    if open_sizes(e).is_some() {
+        return String::new();
+    }
+    let names: Vec<String> =
+        e.may_be_zero().filter(|p| is_shown(words, e, p)).map(|p| (words.parameter)(&e.id, &p.name)).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        [one] => format!("; {one} may be zero"),
+        [one, other] => format!("; {one} and {other} may each be zero"),
+        more => format!("; {} of its {} sizes may each be zero", more.len(), e.parameters.len()),
     }
 }
 
@@ -458,6 +475,23 @@ fn settle(page: &Page<'_>, e: &EffectEntry) -> Option<String> {
 mod tests {
     use super::*;
     use crate::report::closed::vocabulary::bare_entry;
+
+    /// Words are no surer than the intervals beside them.
+    #[test]
+    fn a_size_that_may_be_zero_is_told_beside_how_sure_a_name_is() {
+        use crate::verdict::words::sureness;
+        let size = |name: &str, ci95: [f64; 2]| Parameter { name: name.into(), value: 0.1, unit: "N".into(), ci95 };
+        let told = |sizes: &[(&str, [f64; 2])]| {
+            let parameters = sizes.iter().map(|(name, ci95)| size(name, *ci95)).collect();
+            let e = EffectEntry { probability: 0.99, parameters, ..bare_entry("hysteresis") };
+            (sureness(e.told_probability()), zero_in(Vocabulary::RIG, &e))
+        };
+        let (known, open) = ([0.05, 0.15], [-0.1, 0.3]);
+        assert_eq!(told(&[("width", known)]), ("sure", String::new()));
+        assert_eq!(told(&[("width", open)]), ("likely", "; width may be zero".to_owned()));
+        assert_eq!(told(&[("width", known), ("slack", open)]), ("sure", "; play before it turns may be zero".to_owned()));
+        assert_eq!(told(&[("width", known), ("t0", open)]), ("sure", String::new()));
+    }
 
     /// A name that lacks a third of the certainty says to what: a rival, or names that nobody has thought of, or none.
     #[test]

@@ -222,7 +222,7 @@ fn by_subject(verdict: &Verdict, told: &[&EffectEntry], words: Vocabulary) -> Ve
             None => out.push((e, vec![sized_clause(verdict, words, e).does])),
         }
     }
-    out.iter().map(|(e, parts)| Clause::new(words.said(e).who, list(parts)).with(adverb(e.probability))).collect()
+    out.iter().map(|(e, parts)| Clause::new(words.said(e).who, list(parts)).with(adverb(e.told_probability()))).collect()
 }
 
 fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
@@ -246,7 +246,7 @@ fn contested(verdict: &Verdict, words: Vocabulary, news: bool, disputed: &[&Effe
     let removed = |all: &[&EffectEntry]| all.iter().map(|e| e.heldout_error_reduction).fold(0.0, f64::max);
     let sure: Vec<&EffectEntry> = sure.filter(|e| !beaten(verdict, words, e)).take(MOST - 1).collect();
     let told = sure.len() + all.iter().filter(|e| disputed.iter().any(|d| std::ptr::eq(*d, **e))).count();
-    let said: Vec<String> = sure.iter().map(|e| sized_clause(verdict, words, e).with(adverb(e.probability))).collect();
+    let said: Vec<String> = sure.iter().map(|e| sized_clause(verdict, words, e).with(adverb(e.told_probability()))).collect();
     let out = if sure.is_empty() {
         format!("{}.", since(news, &question))
     } else if removed(&sure) > removed(disputed) {

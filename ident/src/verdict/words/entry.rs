@@ -5,12 +5,14 @@
 //! Units: as the parameters state.
 //! Reference: GUM, clause 7.2.6 (digits of a result).
 
-use super::{DISAGREE, OTHERWISE, POSITIVE, meter, parameter_of, sized};
+use super::{DISAGREE, OTHERWISE, POSITIVE, SURE, meter, parameter_of, sized};
 use crate::verdict::BY_READINGS;
 use crate::verdict::OF_THE_SUPPLY;
 use crate::verdict::TOLD_BY_THE_BOARD;
 use crate::verdict::{EffectEntry, Parameter};
 
+/// Parameters that are no sizes.
+const NO_SIZE: [&str; 4] = ["t0", "t1", "peak_time", "phase"];
 /// Width of an interval, as a share of its value, from which on one value is true of no run: one that a reader would miss by a fifth.
 const OF_NO_RUN: f64 = 0.4;
 
@@ -127,6 +129,22 @@ impl EffectEntry {
         let open = sizes.iter().filter(|p| p.ci95[0] <= 0.0 && p.ci95[1] >= 0.0).count();
         let known = sizes.iter().any(|p| sized(p).is_some());
         (self.id != "unknown" && !known && open > 1 && 2 * open > sizes.len()).then_some((open, sizes.len()))
+    }
+
+    /// The sizes whose interval holds zero. When something happened, and where in its row a reading lies, is no size.
+    pub fn may_be_zero(&self) -> impl Iterator<Item = &Parameter> {
+        self.sizes().filter(|p| p.ci95[0] <= 0.0 && p.ci95[1] >= 0.0)
+    }
+
+    fn sizes(&self) -> impl Iterator<Item = &Parameter> {
+        self.parameters.iter().filter(|p| self.id != "unknown" && !NO_SIZE.contains(&p.name.as_str()))
+    }
+
+    /// The probability that words tell: where every size may be zero they are not surer than the intervals.
+    #[must_use]
+    pub fn told_probability(&self) -> f64 {
+        let open = self.sizes().next().is_some() && self.sizes().count() == self.may_be_zero().count();
+        if open { self.probability.min(SURE - 1e-3) } else { self.probability }
     }
 
     /// How the runs that share it stand to each other, where they do not agree: what is known of it besides, how they differ, and their sizes.
