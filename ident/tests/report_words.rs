@@ -67,6 +67,7 @@ fn verdict(kind: Kind, effects: Vec<EffectEntry>) -> Verdict {
         guessed_floors: None,
         sensor_share: None,
         at_rest: false,
+        held: false,
         validation: vec![],
         runs: vec![],
     }
@@ -589,22 +590,21 @@ fn every_effect_of_a_flight_has_words() {
     assert_eq!(said("mass_offset", unknown_size), "The centre of gravity lies off the middle.");
 }
 
-/// A size is told without its sign: a word tells the direction.
+/// Where nothing moved a model that fits has explained nothing.
 #[test]
-fn a_run_at_rest_explains_nothing() {
-    let said = |kind: Kind| sentence(&Verdict { at_rest: true, ..verdict(kind, vec![]) }, Vocabulary::RIG, false);
-    assert_eq!(said(Kind::None), "The motor never turned: this run says nothing of a load.");
-    assert!(said(Kind::Unattributed).starts_with("The motor never turned: this run says nothing of a load. Something"));
+fn a_run_in_which_nothing_moved_explains_nothing() {
+    let rest = "Nothing moved: the motor never turned. This run shows nothing of the powerplant.";
+    let held = "Nothing moved: the command stayed where it was. This run shows nothing of how the powerplant follows it.";
+    for (at_rest, still) in [(true, rest), (false, held)] {
+        let of = |kind: Kind| Verdict { at_rest, held: !at_rest, ..verdict(kind, vec![]) };
+        for news in [false, true] {
+            assert_eq!(sentence(&of(Kind::None), Vocabulary::RIG, news), still);
+        }
+        let loud = sentence(&of(Kind::Unattributed), Vocabulary::RIG, false);
+        assert!(loud.starts_with(&format!("{still} Something")), "{loud}");
+    }
 }
 
-#[test]
-fn sizes_have_no_sign() {
-    let said = |id: &str, name: &str, value: f64, unit: &str| {
-        let found = effect(id, "thrust_n", 0.95, 0.5, vec![parameter(name, value, 0.01 * value.abs(), unit)]);
-        (Vocabulary::RIG.clause)(&found).sentence()
-    };
-    for (id, name, unit, up, down) in [
-        ("zero_drift", "rate", "N/s", "drifts up by 1.20 N a minute", "drifts down by 1.20 N a minute"),
 /// The head of a page has two lines; causes that these have no room for stand in the paragraph beneath.
 #[test]
 fn a_head_holds_as_many_causes_as_two_lines_do() {
@@ -633,6 +633,14 @@ fn a_head_holds_as_many_causes_as_two_lines_do() {
 }
 
 /// A size is told without its sign: a word tells the direction.
+#[test]
+fn sizes_have_no_sign() {
+    let said = |id: &str, name: &str, value: f64, unit: &str| {
+        let found = effect(id, "thrust_n", 0.95, 0.5, vec![parameter(name, value, 0.01 * value.abs(), unit)]);
+        (Vocabulary::RIG.clause)(&found).sentence()
+    };
+    for (id, name, unit, up, down) in [
+        ("zero_drift", "rate", "N/s", "drifts up by 1.20 N a minute", "drifts down by 1.20 N a minute"),
         ("tare_shift", "offset", "N", "jumps up by 0.0200 N", "jumps down by 0.0200 N"),
         ("gain_change", "gain_change", "1", "rises by 2.00 %", "falls by 2.00 %"),
         ("blade_damage", "thrust_change", "1", "adds 2.00 % of the thrust", "takes 2.00 % of the thrust"),
@@ -861,6 +869,7 @@ fn missing_pulses() -> Verdict {
         recurs: false,
         silent: false,
         stuck: false,
+        timeless: false,
     };
     v.set_aside = vec![aside(4), aside(3)];
     v
@@ -897,7 +906,6 @@ fn an_extrapolation_is_no_size_of_what_is_left() {
 /// A size that is true of no run is told with those of the runs.
 #[test]
 fn a_mean_of_runs_that_disagree_is_told_as_one() {
-        timeless: false,
     let mut lead = sag(0.995);
     lead.parameters[0].ci95 = [0.5 * lead.parameters[0].value, 1.5 * lead.parameters[0].value];
     lead.evidence += "; the runs disagree: alone they have 0.0799 to 0.200 ohm for the resistance";

@@ -117,6 +117,7 @@ pub fn close(log: &Log, model: Option<&Model>, validate: &[Log], progress: &mut 
         left_out,
         set_aside: context.set_aside.clone(),
         at_rest: never_turned(&context),
+        held: never_moved(&context),
         sensor_share: Some(context.consensus.sensor_share).filter(|share| *share > 0.0),
         guessed_floors: is_table(&context, log).then(|| log.len()),
         validation: validate.iter().map(|other| validation(other, &before_model, &after_model)).collect(),
@@ -140,6 +141,16 @@ fn never_turned(context: &Context) -> bool {
     let turns = context.rpm.iter().any(|rpm| *rpm > STANDSTILL);
     let driven = context.pulse.as_ref().is_some_and(|p| p.iter().any(|p| *p > context.start_pulse_us));
     if context.rpm.is_empty() { context.pulse.is_some() && !driven } else { !turns }
+}
+
+/// Widest span of a command that stays where it is, us: a converter's rounding.
+const ROUNDING_US: f64 = 1.0;
+
+/// Whether the command stayed where it was throughout, with the motor on.
+fn never_moved(context: &Context) -> bool {
+    let Some(pulse) = context.pulse.as_ref().filter(|_| !never_turned(context)) else { return false };
+    let known = || pulse.iter().copied().filter(|p| p.is_finite());
+    known().next().is_some() && known().fold(f64::MIN, f64::max) - known().fold(f64::MAX, f64::min) <= ROUNDING_US
 }
 
 /// Where nothing stands and something loud is left all the same, on a channel or on what one speed sensor reads beyond the others, it is told.
@@ -406,5 +417,22 @@ mod tests {
         };
         let at_rest = |rpm: f64| close(&run(rpm), None, &[], &mut |_| {}).expect("a log").verdict.at_rest;
         assert!(at_rest(0.0) && !at_rest(500.0));
+    }
+
+    /// A command that stays where it is shows nothing of what follows it; one that moves does.
+    #[test]
+    fn a_command_that_never_moved_is_told() {
+        let t: Vec<f64> = (0..400).map(|i| 0.1 * f64::from(i)).collect();
+        let wave = |at: f64, k: f64| (0..400).map(|i| at + 0.01 * (k * f64::from(i * i)).sin()).collect::<Vec<f64>>();
+        let run = |step: f64, rpm: f64| {
+            let pulses = (0..400).map(|i| 1500.0 + step * f64::from(i / 40)).collect();
+            let speeds = (0..400).map(|i| rpm * (1.0 + 0.002 * step * f64::from(i / 40))).collect();
+            let columns = [("pulse_us", pulses), ("rpm", speeds), ("thrust_n", wave(1.5, 0.7)), ("current_a", wave(2.0, 1.3))];
+            let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+            Log { name: "held.csv".to_owned(), t: t.clone(), columns, ..Log::default() }
+        };
+        let told = |step: f64, rpm: f64| close(&run(step, rpm), None, &[], &mut |_| {}).expect("a log").verdict;
+        let [held, moved, rest] = [told(0.0, 3000.0), told(40.0, 3000.0), told(0.0, 0.0)];
+        assert!(held.held && !held.at_rest && !moved.held && !rest.held && rest.at_rest);
     }
 }

@@ -335,6 +335,7 @@ impl<'w> Whole<'w> {
             guessed_floors: None,
             sensor_share: None,
             at_rest: false,
+            held: false,
             left_out: Vec::new(),
             validation: Vec::new(),
             runs: Vec::new(),

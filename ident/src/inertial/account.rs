@@ -128,6 +128,7 @@ pub(crate) fn account(recording: &Recording, mut sensors: Vec<Sensor>) -> Closed
         guessed_floors: None,
         sensor_share: None,
         at_rest: false,
+        held: false,
         validation: Vec::new(),
         runs: Vec::new(),
     };

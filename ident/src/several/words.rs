@@ -86,6 +86,7 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
         next_experiment: None,
         left_out: Vec::new(),
         set_aside: Vec::new(),
+        held: runs.iter().all(|r| r.closed.verdict.held),
         at_rest: runs.iter().all(|r| r.closed.verdict.at_rest),
         sensor_share: Some(models[1].sensor_share).filter(|share| *share > 0.0),
         guessed_floors: runs.iter().filter_map(|r| r.closed.verdict.guessed_floors).max(),

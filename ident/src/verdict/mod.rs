@@ -329,6 +329,9 @@ pub struct Verdict {
     /// The motor never turned: nothing is seen of what a load brings about.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub at_rest: bool,
+    /// The command stayed where it was: nothing is seen of how the powerplant follows it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub held: bool,
     /// Other runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub validation: Vec<Validation>,

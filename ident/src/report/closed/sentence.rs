@@ -50,13 +50,22 @@ pub fn sentence(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         Kind::Unattributed => unattributed(verdict, news),
         Kind::None => none(verdict, news),
     };
-    let said = if verdict.at_rest {
-        let rest = if verdict.verdict == Kind::None { String::new() } else { format!(" {said}") };
-        format!("The motor never turned: this run says nothing of a load.{rest}")
-    } else {
-        said
+    let said = match still(verdict) {
+        Some(still) if verdict.verdict == Kind::None => still.to_owned(),
+        Some(still) => format!("{still} {said}"),
+        None => said,
     };
     std::iter::once(said).chain(without_a_model(verdict)).collect::<Vec<_>>().join(" ")
+}
+
+/// That nothing moved, so that a model which fits has explained nothing.
+fn still(verdict: &Verdict) -> Option<&'static str> {
+    let said = "Nothing moved: the command stayed where it was. This run shows nothing of how the powerplant follows it.";
+    match (verdict.at_rest, verdict.held) {
+        (true, _) => Some("Nothing moved: the motor never turned. This run shows nothing of the powerplant."),
+        (false, true) => Some(said),
+        _ => None,
+    }
 }
 
 /// That some channels have no model. Where they are many, the state of the channels says why.
@@ -138,15 +147,6 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         .join(" ")
 }
 
-/// Of the causes, largest first, those that the sentence names. What explains most of a quantity that the largest are not on has no other place
-/// where a reader would miss it.
-fn headed<'v>(verdict: &Verdict, likely: &[&'v EffectEntry]) -> Vec<&'v EffectEntry> {
-    let (first, rest) = likely.split_at(MOST.min(likely.len()));
-    let on = |e: &EffectEntry| e.channels.iter().map(|name| whole(verdict, name)).collect::<Vec<_>>();
-    let taken: Vec<String> = first.iter().flat_map(|e| on(e)).collect();
-    let is_apart = |e: &&&EffectEntry| {
-        shown_by_readings(e) || e.heldout_error_reduction > HALF && !on(e).iter().any(|quantity| taken.contains(quantity))
-    };
 /// Clauses as a sentence that two lines of a head hold, and as many as that has no room for in a second one.
 fn headlong(clauses: &[String], news: bool) -> String {
     let head = |n: usize| format!("{}.", since(news, &joined_lower(&clauses[..n])));
@@ -159,6 +159,15 @@ fn headlong(clauses: &[String], news: bool) -> String {
     }
 }
 
+/// Of the causes, largest first, those that the sentence names. What explains most of a quantity that the largest are not on has no other place
+/// where a reader would miss it.
+fn headed<'v>(verdict: &Verdict, likely: &[&'v EffectEntry]) -> Vec<&'v EffectEntry> {
+    let (first, rest) = likely.split_at(MOST.min(likely.len()));
+    let on = |e: &EffectEntry| e.channels.iter().map(|name| whole(verdict, name)).collect::<Vec<_>>();
+    let taken: Vec<String> = first.iter().flat_map(|e| on(e)).collect();
+    let is_apart = |e: &&&EffectEntry| {
+        shown_by_readings(e) || e.heldout_error_reduction > HALF && !on(e).iter().any(|quantity| taken.contains(quantity))
+    };
     first.iter().chain(rest.iter().find(is_apart)).copied().collect()
 }
 

@@ -118,6 +118,7 @@ pub(crate) fn bare_verdict(unexplained: Vec<crate::verdict::Unexplained>) -> cra
         guessed_floors: None,
         sensor_share: None,
         at_rest: false,
+        held: false,
         validation: Vec::new(),
         runs: Vec::new(),
     }
