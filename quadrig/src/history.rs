@@ -11,7 +11,7 @@ use crate::folder::Folder;
 use crate::open::{Columns, Names, may_be_a_run, no_run_in, opened};
 use crate::progress::Bar;
 use crate::trouble::unread;
-use ident::history::{Change, Chart, Entry, History, Measure, named, summary};
+use ident::history::{Change, Chart, Entry, History, Measure, in_doubt, named, summary};
 use ident::log::Log;
 use ident::report::{history_page, history_terminal};
 use serde::Serialize;
@@ -51,6 +51,9 @@ struct Told<'h> {
     format: &'static str,
     summary: String,
     dated: bool,
+    /// Why the runs are hardly of one rig.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    in_doubt: Option<String>,
     runs: &'h [Entry],
     changes: &'h [Change],
     charts: Vec<Charted<'h>>,
@@ -76,6 +79,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         let compared = History::of(&logs, &|share| bar.set(COMPARED * share));
         let (mut history, order) = compared.map_err(|why| format!("{why}{}", without(&refused)))?;
         refused.iter().for_each(|line| note!("left out: {line}"));
+        in_doubt(&history).iter().filter(|_| !quiet).for_each(|doubt| note!("warning: {doubt}"));
         let ordered: Vec<&Log> = order.iter().map(|k| &logs[*k]).collect();
         named(&mut history, &ordered, &|share| bar.set(COMPARED + (1.0 - COMPARED) * share));
         history
@@ -152,6 +156,7 @@ fn told(history: &History) -> Told<'_> {
         format: "quadrig-history 1",
         summary: summary(history),
         dated: history.dated,
+        in_doubt: in_doubt(history),
         runs: &history.runs,
         changes: &history.changes,
         charts: history.measures.iter().enumerate().filter_map(chart).collect(),

@@ -28,6 +28,7 @@ pub use find::{Change, Kind, Moved};
 pub use limits::{Chart, fewest_judged};
 pub use measure::{Measure, Scale, Value};
 pub use name::{Name, named};
+pub use same::in_doubt;
 pub(crate) use words::by;
 pub use words::{gap, sentence, summary};
 

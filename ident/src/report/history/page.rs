@@ -8,7 +8,7 @@
 
 use super::chart::chart;
 use super::{MOVED, bracketed, foremost, why_no_change};
-use crate::history::{Change, Entry, History, Name, fewest_judged, gap, sentence, summary};
+use crate::history::{Change, Entry, History, Name, fewest_judged, gap, in_doubt, sentence, summary};
 use crate::report::sheet::Sheet;
 use crate::verdict::words::{probability, upper, with_interval};
 
@@ -20,6 +20,7 @@ const ABOVE: usize = 9;
 pub fn page(history: &History) -> String {
     let mut sheet = Sheet::told("A rig's history", &heading(history));
     sheet.soft(&span(history));
+    in_doubt(history).iter().for_each(|doubt| sheet.warn(&format!("{}.", upper(doubt))));
     let shown = charted(history);
     let (above, below) = shown.split_at(shown.len().min(ABOVE));
     sheet.section("Control charts");
