@@ -1,7 +1,7 @@
 //! The second log's channels on the stand's rows.
 //!
-//! What it is: each of its columns at the times of the stand's rows, a command as it stood and everything else on a straight line, under a
-//! name that tells the logger; a channel that the stand lacks altogether takes the contract's name.
+//! What it is: each of its columns at the times of the stand's rows, commands, codes and states as they stood and everything else on a straight
+//! line, under a name that tells the logger; a channel that the stand lacks altogether takes the contract's name.
 //! What can go wrong: outside the second log and across its gaps nothing is known, and nothing is filled in.
 //! Units: the channels'.
 //! Reference: specification `formats.md`, "Rig log": names of further channels.
@@ -16,6 +16,37 @@ pub const LABELS: [&str; 4] = ["esc", "fc", "board", "stand2"];
 
 /// Longest gap that a straight line bridges: so many usual steps, and not under this, s.
 const GAP: (f64, f64) = (5.0, 0.25);
+
+/// Words in a name that speak of a state or of a code: half of one and half of another is none.
+const STATES: [&str; 15] = [
+    "status", "state", "states", "error", "errors", "err", "fault", "faults", "flag", "flags", "code", "codes", "mode", "armed",
+    "alarm",
+];
+/// Words with which the name of a quantity begins that carries no unit.
+const QUANTITIES: [&str; 11] =
+    ["rpm", "erpm", "duty", "throttle", "command", "thrust", "torque", "current", "voltage", "temp", "power"];
+/// Units at the end of a quantity's name.
+const UNITS: [&str; 23] = [
+    "a", "ma", "v", "mv", "n", "nm", "c", "k", "us", "ms", "s", "mah", "ah", "w", "wh", "hz", "deg", "pct", "percent", "hpa",
+    "g", "kg", "rpm",
+];
+/// Most different whole numbers of a column without unit or known name that are codes.
+const CODES: usize = 16;
+
+/// Whether a column holds codes or states: whole numbers that are no quantity.
+fn is_state(column: &Column) -> bool {
+    let mut values: Vec<f64> = column.values.iter().copied().filter(|v| v.is_finite()).collect();
+    if values.is_empty() || values.iter().any(|v| v.fract() != 0.0) {
+        return false;
+    }
+    values.sort_unstable_by(f64::total_cmp);
+    values.dedup();
+    let name = column.name.to_lowercase();
+    let mut words = name.split('_');
+    let (first, last) = (words.next().unwrap_or_default(), words.next_back().unwrap_or_default());
+    let says = name.split('_').any(|word| STATES.contains(&word));
+    !UNITS.contains(&last) && (says || !QUANTITIES.contains(&first) && values.len() <= CODES)
+}
 
 /// The name of another logger's column.
 fn named(name: &str, label: &str) -> String {
@@ -52,7 +83,7 @@ pub fn merge(stand: &mut Log, other: &Log, joint: &Joint, label: &str) -> Report
     let t: Vec<f64> = other.t.iter().map(|t| joint.to_stand(*t)).collect();
     let has_speed = SPEED.iter().any(|s| stand.column(s).is_some());
     for column in &other.columns {
-        let hold = column.name.starts_with("pulse_us");
+        let hold = column.name.starts_with("pulse_us") || is_state(column);
         let values = onto(&stand.t, &t, &column.values, hold);
         let known = values.iter().filter(|v| v.is_finite()).count();
         if known == 0 {
@@ -129,6 +160,47 @@ mod tests {
         );
         assert!(is_second_reading("rpm_fc") && is_second_reading("current_esc_a"));
         assert!(!is_second_reading("rpm_electrical") && !is_second_reading("rpm") && !is_second_reading("temp_esc_c"));
+    }
+
+    /// What counts states or bits is taken from the row before; what measures is not, whole numbers or not.
+    #[test]
+    fn codes_are_taken_as_they_stood() {
+        let of = |name: &str, values: &[f64]| is_state(&Column { name: name.into(), values: values.to_vec() });
+        let codes = [0.0, 4.0, f64::NAN, 64.0];
+        for name in ["status", "error_code", "esc_flags", "fault_esc", "x7"] {
+            assert!(of(name, &codes), "{name}");
+        }
+        for name in ["rpm", "rpm_electrical", "voltage_v", "charge_esc_mah", "duty", "state_of_charge_pct", "temp_c"] {
+            assert!(!of(name, &codes), "{name}");
+        }
+        let many: Vec<f64> = (0..100).map(f64::from).collect();
+        assert!(!of("x7", &many) && !of("status", &[0.5, 1.0]) && of("status", &many) && !of("status", &[f64::NAN]));
+    }
+
+    /// Between a row without a fault and one with code 4 there is no code 2.
+    #[test]
+    fn a_joined_log_has_no_codes_that_nobody_wrote() {
+        let column = |name: &str, values: Vec<f64>| Column { name: name.to_owned(), values };
+        let mut stand = Log { t: (0..40).map(|i| 0.05 * f64::from(i)).collect(), ..Log::default() };
+        let of = |f: &dyn Fn(i32) -> f64| (0..20).map(f).collect::<Vec<f64>>();
+        let columns =
+            vec![column("status", of(&|i| f64::from(4 * (i / 10)))), column("temp_c", of(&|i| 20.0 + f64::from(2 * i)))];
+        let other = Log { t: of(&|i| 0.1 * f64::from(i)), columns, ..Log::default() };
+        let joint = Joint {
+            offset_s: (0.0, 0.0),
+            drift_ppm: (0.0, 0.0),
+            pivot_s: 0.0,
+            worst_s: 0.0,
+            overlap_s: (0.0, 2.0),
+            seen: Vec::new(),
+            pieces: Vec::new(),
+        };
+        let report = merge(&mut stand, &other, &joint, "esc");
+        let codes = stand.column("status_esc").expect("the codes");
+        assert!(codes.iter().all(|v| [0.0, 4.0].contains(v) || v.is_nan()) && codes[19] == 0.0 && codes[20] == 4.0, "{codes:?}");
+        assert_eq!(stand.column("temp_c").map(|t| (t[1] * 1e6).round() / 1e6), Some(21.0), "a temperature lies between");
+        let how = |name: &str| report.notes.iter().find(|n| n.column == name).map(|n| n.what.clone()).unwrap_or_default();
+        assert!(how("status_esc").contains("as it stood") && how("temp_c").contains("on straight lines"));
     }
 
     #[test]
