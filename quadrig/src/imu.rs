@@ -6,12 +6,17 @@
 //! Units: as the board prints them.
 //! Reference: specification `ahrs.md`, "Board".
 
+mod words;
+
 use crate::Failure;
 use crate::board::{Board, Heard};
 use crate::port::PortArgs;
-use firmware_ahrs::{line, text};
+use firmware_ahrs::line;
+use frame::message::SettingsNews;
 use frame::{Command, Event, ImuCommand, ImuFormat, ImuReport, ImuSensor, Message};
+use std::cell::RefCell;
 use std::time::Duration;
+use words::WORDS;
 
 /// Speed of the IMU board's line (pin table of the board).
 const BAUD: u32 = 460_800;
@@ -30,14 +35,14 @@ pub(crate) struct Args {
     words: Vec<String>,
 }
 
-/// What the board understands.
-const WORDS: &str = "identify; format text|binary; send raw|calibrated|both; stream on|off; once; calibrate gyro|accel|mag|align; finish; cancel; save; load; reset; errors";
-
 /// Runs the command.
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
-    let typed = args.words.join(" ");
-    let command = line::command(&typed)
-        .ok_or_else(|| format!("{typed:?} is no command of the IMU board; expected one of: {WORDS}: `quadrig imu --help`"))?;
+    let typed = args.words.join(" ").to_lowercase();
+    let command = line::command(&typed).ok_or_else(|| {
+        format!("{typed:?} is no command of the IMU board; expected {} (`quadrig imu --help`)", words::known(&typed))
+    })?;
+    let next =
+        words::next(&command, args.port.is_virtual(), args.port.is_virtual() && args.port.flash.is_none()).filter(|_| !quiet);
     let mut board = Board::at(args.port.open(BAUD, true)?);
     let text_wanted = command == Command::Imu(ImuCommand::Format(ImuFormat::Text));
     if !text_wanted {
@@ -47,16 +52,22 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     }
     board.send(command)?;
     if text_wanted {
+        next.iter().for_each(|next| note!("{next}"));
         return Ok(()); // it answers in text
     }
-    let mut refusal = None;
-    let mut show = |message: &Message| {
+    let refusal = RefCell::new(None);
+    let show = |message: &Message| {
         let sample = matches!(message, Message::Imu(_) | Message::ImuValues(_) | Message::TestAccel(_));
-        if let (false, Some(line)) = (quiet || (sample && command != Command::Imu(ImuCommand::Once)), text::line(message)) {
+        if let (false, Some(line)) = (quiet || (sample && command != Command::Imu(ImuCommand::Once)), words::line(message)) {
+            words::columns(message).iter().for_each(|columns| note!("{columns}"));
             crate::say::text(&line);
         }
-        if let Message::Event(Event::Refused(_)) | Message::ImuReport(ImuReport::Refused { .. }) = message {
-            refusal = text::line(message);
+        if matches!(message, Message::Event(Event::Accepted | Event::Settings(SettingsNews::Saved))) {
+            next.iter().for_each(|next| note!("{next}"));
+        }
+        words::in_force(message).iter().filter(|_| !quiet).for_each(|told| note!("{told}"));
+        if let Some(why) = words::refusal(&command, message) {
+            refusal.replace(Some(why));
         }
     };
     let ended = listen(&mut board, ANSWER, |m| {
@@ -64,13 +75,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         answers(&command, m)
     })?;
     let follows = matches!(command, Command::Imu(ImuCommand::Calibrate(ImuSensor::Gyro | ImuSensor::Accel)));
-    if follows && ended {
-        listen(&mut board, Duration::from_secs_f64(args.patience), |m| {
+    if follows && ended && refusal.borrow().is_none() {
+        let patience = Duration::from_secs_f64(args.patience);
+        let ended = hear(&mut board, patience, |m| {
             show(m);
             matches!(m, Message::ImuReport(ImuReport::Calibrated(_) | ImuReport::Refused { .. }))
         })?;
+        if !ended {
+            let expected = "expected it done within --patience: the board goes on, \"cancel\" gives it up";
+            return Err(format!("\"{typed}\" has not ended in {} s; {expected}", args.patience).into());
+        }
     }
-    refusal.map_or(Ok(()), |line| Err(format!("the board says {}", line.trim_end()).into()))
+    refusal.into_inner().map_or(Ok(()), |why| Err(why.into()))
 }
 
 /// Whether a message ends the answer to a command.
@@ -85,8 +101,20 @@ fn answers(command: &Command, message: &Message) -> bool {
     }
 }
 
-/// Hears messages until one is the last.
-fn listen(board: &mut Board, patience: Duration, mut last: impl FnMut(&Message) -> bool) -> Result<bool, Failure> {
+/// Hears messages until one is the last; silence is refused.
+fn listen(board: &mut Board, patience: Duration, last: impl FnMut(&Message) -> bool) -> Result<bool, Failure> {
+    match hear(board, patience, last)? {
+        true => Ok(true),
+        false => Err(format!(
+            "no answer from the board; expected one in {} s: is it powered, and an IMU board?",
+            patience.as_secs_f64()
+        )
+        .into()),
+    }
+}
+
+/// Whether one of the messages of so long a time is the last.
+fn hear(board: &mut Board, patience: Duration, mut last: impl FnMut(&Message) -> bool) -> Result<bool, Failure> {
     let until = board.now() + patience;
     while board.now() < until {
         match board.hear() {
@@ -98,6 +126,5 @@ fn listen(board: &mut Board, patience: Duration, mut last: impl FnMut(&Message) 
             }
         }
     }
-    Err(format!("no answer from the board; expected one in {} s: is it powered, and an IMU board?", patience.as_secs_f64())
-        .into())
+    Ok(false)
 }

@@ -54,6 +54,11 @@ impl PortArgs {
         paths.reads_too(scenario).reads_too(schedule).reads(&self.flash).reads(&self.image)
     }
 
+    /// Whether it is a board in this program, which ends with the command.
+    pub(crate) fn is_virtual(&self) -> bool {
+        self.scenario().is_some()
+    }
+
     /// Whether one was named.
     pub(crate) fn is_given(&self) -> bool {
         !self.port.is_empty()

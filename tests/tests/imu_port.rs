@@ -40,8 +40,9 @@ fn the_words_of_the_board_are_those_of_the_command_line() {
     imu(&["stream", "off"]).succeeded();
     let said = imu(&["once"]).succeeded().out;
     assert!(said.lines().any(|l| l.starts_with("cal,") && l.split(',').count() == 14), "{said}");
-    assert!(imu(&["errors"]).succeeded().out.contains("lost 0,0,0,0"));
-    imu(&["calibrate", "mag"]).succeeded();
+    assert!(imu(&["errors"]).succeeded().out.contains("gyro 0, accel 0, mag 0, test accel 0"));
+    imu(&["finish"]).refused(&["\"calibrate mag\" or \"calibrate align\" before \"finish\""]);
+    assert!(imu(&["calibrate", "mag"]).succeeded().err.contains("turn it into every direction, then say \"finish\""));
     imu(&["finish", "now"]).refused(&["finish now", "--help"]);
     imu(&["cancel"]).succeeded();
     imu(&["--patience", "0", "errors"]).refused(&["--patience"]);

@@ -85,6 +85,7 @@ const AREAS: [(&str, &[&str]); 14] = [
             "quadrig/src/board.rs",
             "quadrig/src/port.rs",
             "quadrig/src/imu.rs",
+            "quadrig/src/imu",
             "quadrig/src/virtual_port.rs",
             "quadrig/src/view",
             "quadrig/src/flash.rs",
