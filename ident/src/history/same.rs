@@ -32,7 +32,7 @@ pub fn in_doubt(history: &History) -> Option<String> {
     let told = |v: super::Value| with_interval(v.value, [v.value - v.half(), v.value + v.half()])[0].clone();
     let (times, unit) = (most.1.value / least.1.value, &history.measures[k].unit);
     Some(format!(
-        "hardly the same propeller: k_T is {} {unit} in {} and {} in {}, {times:.1} times as much, and air and voltage change it {AIR} times at the most; check propeller and scale of thrust, and give each rig's runs alone",
+        "hardly the same propeller: k_T is {} {unit} in {} and {} in {}, {times:.1} times as much. Air and voltage change it {AIR} times at the most. Check propeller and scale of thrust, and give each rig's runs alone",
         told(least.1),
         least.0,
         told(most.1),
@@ -85,7 +85,7 @@ mod tests {
     fn a_propeller_of_another_size_is_told_and_another_day_is_not() {
         let said = in_doubt(&runs([1.5e-5, 5.7e-5, 1.6e-5], 1e-8)).expect("a doubt");
         for told in
-            ["1.5000e-5 N.s2 in 0.csv", "5.7000e-5 in 1.csv", "3.8 times as much", "1.5 times at the most", "check propeller"]
+            ["1.5000e-5 N.s2 in 0.csv", "5.7000e-5 in 1.csv", "3.8 times as much", "1.5 times at the most", "Check propeller"]
         {
             assert!(said.contains(told), "{told}: {said}");
         }
