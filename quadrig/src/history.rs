@@ -17,9 +17,6 @@ use ident::report::{history_page, history_terminal};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Share of the time that comparing takes; the rest goes into names.
-const COMPARED: f64 = 0.33;
-
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -73,17 +70,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let folder = args.output.as_deref().map(|path| Folder::new(path, "history")).transpose()?;
     let files = files(&args.runs)?;
     let (logs, refused, found) = read(&files, args, quiet);
-    found.iter().filter(|_| !quiet).for_each(|line| note!("{line}"));
-    let history = {
+    let (mut history, order) = {
         let bar = Bar::new("comparing", quiet);
-        let compared = History::of(&logs, &|share| bar.set(COMPARED * share));
-        let (mut history, order) = compared.map_err(|why| format!("{why}{}", without(&refused)))?;
-        refused.iter().for_each(|line| note!("left out: {line}"));
-        in_doubt(&history).iter().filter(|_| !quiet).for_each(|doubt| note!("warning: {doubt}"));
-        let ordered: Vec<&Log> = order.iter().map(|k| &logs[*k]).collect();
-        named(&mut history, &ordered, &|share| bar.set(COMPARED + (1.0 - COMPARED) * share));
-        history
+        History::of(&logs, &|share| bar.set(share)).map_err(|why| format!("{why}{}", without(&refused)))?
     };
+    found.iter().filter(|_| !quiet).for_each(|line| note!("{line}"));
+    refused.iter().for_each(|line| note!("left out: {line}"));
+    in_doubt(&history).iter().filter(|_| !quiet).for_each(|doubt| note!("warning: {doubt}"));
+    let ordered: Vec<&Log> = order.iter().map(|k| &logs[*k]).collect();
+    {
+        let bar = Bar::new("naming", quiet);
+        named(&mut history, &ordered, &|share| bar.set(share));
+    }
     let json = serde_json::to_string_pretty(&told(&history))?;
     if let Some(mut folder) = folder {
         folder.add("history.csv", csv(&history)?);
