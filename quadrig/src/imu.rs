@@ -39,7 +39,10 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
     let typed = args.words.join(" ").to_lowercase();
     let command = line::command(&typed).ok_or_else(|| {
-        format!("{typed:?} is no command of the IMU board; expected {} (`quadrig imu --help`)", words::known(&typed))
+        format!(
+            "{typed:?} is no command of the IMU board; expected words that it knows: {} (`quadrig imu --help`)",
+            words::known(&typed)
+        )
     })?;
     let next =
         words::next(&command, args.port.is_virtual(), args.port.is_virtual() && args.port.flash.is_none()).filter(|_| !quiet);
