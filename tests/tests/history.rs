@@ -131,13 +131,13 @@ fn exports_are_runs_and_a_bad_file_costs_one_line() {
     let said = call(folder.path(), &["history", "runs", "--json"]).succeeded();
     let broken =
         "left out: runs/broken.csv:3: column thrust_n: 'x'; expected a decimal number, or an empty field for a missing sample\n";
-    assert!(said.err.ends_with(broken) && said.err.matches("left out").count() == 1, "{}", said.err);
+    assert!(said.err.ends_with(broken) && said.err.matches("\nleft out: ").count() == 1, "{}", said.err);
     // what was converted is said of each file, in one block
     for seed in SEEDS {
         let block = format!("runs/run{seed}.csv: read as an export; found on the way:\n  ");
         assert_eq!(said.err.matches(&block).count(), 1, "{}", said.err);
     }
-    assert_eq!(said.err.matches("Thrust (N)").count(), SEEDS.count(), "{}", said.err);
+    assert_eq!(said.err.matches("column 'Thrust (N)' is taken").count(), SEEDS.count(), "{}", said.err);
     assert_eq!(call(folder.path(), &["--quiet", "history", "runs", "--json"]).succeeded().err, broken);
 
     // a run that is laid beside another, and one whose levels are asked for, are no exception

@@ -221,6 +221,6 @@ mod tests {
     #[test]
     fn words_that_are_no_command_are_told_their_likes() {
         assert_eq!(known("calibrate foo"), "\"calibrate gyro|accel|mag|align\"");
-        assert_eq!(known("dance"), WORDS.to_owned());
+        assert_eq!(known("dance"), WORDS);
     }
 }
