@@ -8,10 +8,11 @@
 //! Reference: specification `closing-the-loop.md`, step 7.
 
 use crate::attribution::correction::{correct, without_correction};
-use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE};
+use crate::attribution::evidence::Candidate;
 use crate::attribution::opponent::{Contested, contested, correction, explains, groups, left_over, news_left, noisier};
 use crate::attribution::together::Ground;
 use crate::attribution::unexplained::LOUD;
+use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::placed::Placed;
 use crate::fit::heldout::{self, Held};
 use crate::fit::search::{connected, refine};

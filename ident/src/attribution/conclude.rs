@@ -7,7 +7,7 @@
 //! Units: errors in the channel's unit, shares of them.
 //! Reference: specification `closing-the-loop.md`, step 6; `formats.md`, "Verdict" ("no name may make things worse").
 
-use crate::attribution::diagnose::NEEDED_REDUCTION;
+use crate::attribution::choose::NEEDED_REDUCTION;
 use crate::attribution::unexplained::wanders;
 use crate::channel::{Context, Target};
 use crate::effects::placed::Placed;

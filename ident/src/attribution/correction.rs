@@ -9,7 +9,7 @@
 //! Reference: one-standard-error rule, Breiman et al. 1984, *Classification and Regression Trees*, section 3.4.3; specification
 //! `closing-the-loop.md`, step 7.
 
-use crate::attribution::diagnose::NEEDED_REDUCTION;
+use crate::attribution::choose::NEEDED_REDUCTION;
 use crate::attribution::opponent::{correction, is_load};
 use crate::channel::{Context, Relation};
 use crate::effects::placed::Placed;

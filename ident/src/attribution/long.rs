@@ -8,13 +8,16 @@
 //! Units: rows, s.
 //! Reference: notes on method, "for long logs scan on a part, refine on all rows"; rule of the rows in [`kept`].
 
+use crate::attribution::choose::worth_a_name;
 use crate::attribution::conclude::{Errors, harmful};
-use crate::attribution::diagnose::{
-    Candidate, Diagnosis, NEEDED_EVIDENCE, diagnose, net_gain, offers, shares, without, worth_a_name,
-};
+use crate::attribution::diagnose::{Diagnosis, diagnose};
+use crate::attribution::evidence::{Candidate, net_gain, shares};
 use crate::attribution::places::may_join;
+use crate::attribution::round::offers;
+use crate::attribution::together::without;
 use crate::channel::{Context, Target};
 use crate::effects::Estimate;
+use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::placed::Placed;
 use crate::fit::heldout::{self, Around, Held};
 use crate::fit::search::refine;

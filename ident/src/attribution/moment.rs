@@ -7,8 +7,9 @@
 //! Units: nats, s.
 //! Reference: case deletion, Cook 1977, Technometrics 19:15.
 
-use crate::attribution::diagnose::{NEEDED_EVIDENCE, penalty};
+use crate::attribution::evidence::penalty;
 use crate::channel::Context;
+use crate::effects::NEEDED_EVIDENCE;
 use crate::fit::Fit;
 use crate::fit::heldout;
 use crate::model::Declared;

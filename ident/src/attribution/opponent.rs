@@ -6,10 +6,13 @@
 //! Units: evidence in nats.
 //! Reference: discrepancy modelling, Ebers et al. 2022 (arXiv 2203.05164); specification `closing-the-loop.md`, step 7.
 
-use crate::attribution::diagnose::{Candidate, FEWEST_SAMPLES, NEEDED_EVIDENCE, NEEDED_REDUCTION, net_gain, shares};
+use crate::attribution::choose::NEEDED_REDUCTION;
+use crate::attribution::evidence::{Candidate, net_gain, shares};
 use crate::attribution::moment::best_moment;
+use crate::attribution::round::FEWEST_SAMPLES;
 use crate::channel::lattice;
 use crate::channel::{Context, DIFFERENCES, Relation, Target};
+use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::placed::Placed;
 use crate::effects::unknown::{Unknown, variables};
 use crate::effects::{Effect, Instance};

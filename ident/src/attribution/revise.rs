@@ -7,13 +7,13 @@
 //! Units: evidence in nats.
 //! Reference: stepwise regression with exchange, Miller 2002, Subset Selection in Regression, section 3.6.
 
-use crate::attribution::diagnose::{
-    Candidate, NEEDED_EVIDENCE, REFINED, Scanned, evidence_over, is_part_of, newest, offers, round_of,
-};
+use crate::attribution::evidence::{Candidate, evidence_over};
 use crate::attribution::places::may_join;
 use crate::attribution::rivals::probabilities;
+use crate::attribution::round::{REFINED, Scanned, is_part_of, newest, offers, round_of};
 use crate::attribution::split::split;
 use crate::channel::Context;
+use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::placed::Placed;
 use crate::fit::heldout::{self, Held};
 use crate::fit::search::{connected, refine};

@@ -6,11 +6,16 @@
 //! Units: evidence in nats, probabilities 0 to 1.
 //! Reference: Kass & Raftery 1995, Bayes Factors, JASA 90:773.
 
-use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE};
+use crate::attribution::evidence::Candidate;
+use crate::effects::NEEDED_EVIDENCE;
 use crate::fit::Fit;
+
+/// Share of the winner's probability at which a second hypothesis makes the verdict ambiguous.
+pub(crate) const RIVAL: f64 = 0.5;
 
 /// Softmax temperature from evidence to probability.
 pub(crate) const TEMPERATURE: f64 = 4.0;
+
 /// Another hypothesis: one effect of the winner replaced.
 #[derive(Debug, Clone)]
 pub struct Rival {

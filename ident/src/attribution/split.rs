@@ -6,9 +6,10 @@
 //! Units: evidence in nats.
 //! Reference: Schwarz 1978 (penalty).
 
-use crate::attribution::diagnose::{Candidate, Scanned, evidence_counted, shares};
+use crate::attribution::evidence::{Candidate, evidence_counted, shares};
 use crate::attribution::places::may_join;
 use crate::attribution::revise::{CLEARLY_BETTER, Round, predicts_as_well};
+use crate::attribution::round::Scanned;
 use crate::channel::Context;
 use crate::effects::placed::Placed;
 use crate::fit::search::{base, refine, scan};

@@ -8,10 +8,12 @@
 //! Units: evidence in nats.
 //! Reference: specification `closing-the-loop.md`, step 7.
 
-use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, weigh};
+use crate::attribution::evidence::{Candidate, evidence_over, weigh};
 use crate::attribution::rivals::Rival;
+use crate::attribution::round::Scanned;
 use crate::channel::Context;
 use crate::effects;
+use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::placed::Placed;
 use crate::fit::heldout::residuals;
 use crate::fit::search::{base, refine_newest, scan};

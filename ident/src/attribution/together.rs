@@ -8,10 +8,13 @@
 //! Units: evidence in nats.
 //! Reference: forward selection misses jointly significant sets, Miller 2002, Subset Selection in Regression, section 3.2.
 
-use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, Scanned, evidence_over, loud, round_of, without};
+use crate::attribution::evidence::{Candidate, evidence_over};
+use crate::attribution::round::{Scanned, loud, round_of};
 use crate::channel::{Context, Relation};
+use crate::effects::NEEDED_EVIDENCE;
 use crate::fit::heldout::{self, Held};
-use crate::fit::{Fit, scatters};
+use crate::fit::search::refine;
+use crate::fit::{Fit, Rows, fit, scatters};
 use crate::model::Declared;
 
 /// Firsts of a group that are tried.
@@ -132,4 +135,12 @@ fn most_taken(context: &Context, has_room: &[bool], fit: &Fit, before: &Fit) -> 
             (new.loglik.of(scattering) - old.loglik.of(scattering)) / (t.weight * t.rows.len() as f64)
         })
         .fold(0.0, f64::max)
+}
+
+/// A hypothesis without its `k`-th effect, its shapes refined again.
+pub(crate) fn without(context: &Context, declared: Declared<'_>, fit_all: &Fit, k: usize, start: &Fit) -> Option<Fit> {
+    let mut placed = fit_all.placed.clone();
+    placed.remove(k);
+    let placed = refine(context, declared, &placed, Rows::All, 60);
+    fit(context, declared, &placed, Some(start), Rows::All)
 }

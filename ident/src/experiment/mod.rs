@@ -245,7 +245,7 @@ mod tests {
         let fitted =
             |id: &str| crate::fit::fit(&closed.context, declared, &placed(id), None, crate::fit::Rows::All).expect("a fit");
         let mut diagnosis = closed.diagnosis.clone();
-        diagnosis.best = crate::attribution::diagnose::Candidate { fit: fitted("thermal_zero"), evidence: 0.0 };
+        diagnosis.best = crate::attribution::evidence::Candidate { fit: fitted("thermal_zero"), evidence: 0.0 };
         let ids = vec!["zero_drift".to_owned()];
         diagnosis.rivals = vec![crate::attribution::rivals::Rival { ids, probability: 0.5, fit: fitted("zero_drift") }];
         let model = Model::from_fit(&closed.context, &Log::default(), declared, &diagnosis.best.fit);

@@ -11,7 +11,7 @@
 
 use super::History;
 use super::find::{Change, Kind, one_speed};
-use crate::attribution::diagnose::RIVAL;
+use crate::attribution::rivals::RIVAL;
 use crate::channel::is_contrast;
 use crate::close::{Closed, close};
 use crate::effects::{self, Effect, Shape};

@@ -11,9 +11,12 @@
 
 use super::size::Line;
 use crate::attribution::beside::ask;
-use crate::attribution::diagnose::{Candidate, NEEDED_EVIDENCE, REFINED, Scanned, choose, offers, round_of};
+use crate::attribution::choose::choose;
+use crate::attribution::evidence::Candidate;
+use crate::attribution::round::{REFINED, Scanned, offers, round_of};
 use crate::attribution::together::Ground;
 use crate::channel::{Context, Facts};
+use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::placed::Placed;
 use crate::fit::heldout;
 use crate::fit::{Fit, Rows, fit, is_plausible, part_of};

@@ -9,7 +9,8 @@
 //! Reference: the search's own constants, `rivals.rs` and `diagnose.rs`.
 
 use super::ask::{Answer, Question, Rig};
-use crate::attribution::diagnose::{Candidate, RIVAL};
+use crate::attribution::evidence::Candidate;
+use crate::attribution::rivals::RIVAL;
 use crate::attribution::rivals::TEMPERATURE;
 
 /// Sizes beyond the one at which a cause is named at which it is still asked about, in doublings.

@@ -20,8 +20,8 @@ pub use group::Group;
 pub use words::{Standing, short};
 
 use crate::attribution::columns::candidates::LEAST_ANGLE;
-use crate::attribution::diagnose::offers;
 use crate::attribution::long::{kept, thinned};
+use crate::attribution::round::offers;
 use crate::close::{Closed, close};
 use crate::effects::library;
 use crate::effects::placed::Placed;

@@ -8,7 +8,7 @@
 //! Reference: separable least squares, Golub & Pereyra 1973.
 
 use super::Quantity;
-use crate::attribution::diagnose::span;
+use crate::attribution::choose::span;
 use crate::channel::Context;
 use crate::effects::design::{Label, TargetDesign};
 use crate::effects::placed::Placed;

@@ -8,7 +8,7 @@
 
 use super::joint::{Across, Compared, Joint, Shared, compared};
 use super::{FEWEST, Member};
-use crate::attribution::diagnose::NEEDED_REDUCTION;
+use crate::attribution::choose::NEEDED_REDUCTION;
 use crate::attribution::unexplained::LOUD;
 use crate::channel::Context;
 use crate::close::Closed;

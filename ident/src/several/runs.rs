@@ -7,7 +7,8 @@
 //! Units: scores in nats.
 //! Reference: cross-validation over runs; discrimination by a second experiment, Atkinson & Fedorov 1975, Biometrika 62:57.
 
-use crate::attribution::diagnose::{Candidate, Diagnosis};
+use crate::attribution::diagnose::Diagnosis;
+use crate::attribution::evidence::Candidate;
 use crate::attribution::rivals::{Rival, TEMPERATURE};
 use crate::channel::Context;
 use crate::close::Closed;

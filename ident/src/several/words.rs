@@ -9,7 +9,7 @@ use super::Run;
 use super::entries::{alternatives, entry, own_entries, unexplained, unnamed};
 use super::folds::Tenable;
 use super::joint::{Across, Compared, Joint};
-use crate::attribution::diagnose::RIVAL;
+use crate::attribution::rivals::RIVAL;
 use crate::attribution::unexplained::looks_like;
 use crate::channel::{Context, Relation, is_contrast, unit_of};
 use crate::close::{NO_COMMAND, validation};
