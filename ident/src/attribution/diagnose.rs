@@ -14,7 +14,7 @@ use crate::attribution::places::{MOST_EFFECTS, of_this_rig};
 use crate::attribution::revise::{Round, revise};
 use crate::attribution::rivals::{RIVAL, Rival};
 use crate::attribution::round::{REFINED, Scanned, offers, round_of};
-use crate::attribution::standing::Standing;
+use crate::attribution::standing::{Settled, Standing};
 use crate::attribution::sure::{Sureness, sureness};
 use crate::attribution::together::{Ground, choose_together};
 use crate::channel::{Context, Target};
@@ -105,7 +105,7 @@ pub fn diagnose(context: &Context, declared: Declared<'_>, progress: &mut dyn Fn
     let singles = found.candidates.first().map_or(&[][..], Vec::as_slice);
     let mut standing = Standing::of(found.best, found.errors, found.rounds);
     let contested = standing.take_back(ground, &heldout_before)?;
-    let (heldout_without, estimates) = standing.settle(ground, &heldout_before, &contested)?;
+    let Settled { without: heldout_without, estimates } = standing.settle(ground, &heldout_before, &contested)?;
     let Sureness { probability, unknown } = sureness(ground, &mut standing, &estimates, singles);
     progress(1.0);
     let Standing { best, errors: heldout_after, inclusion, rivals } = standing;

@@ -29,6 +29,14 @@ pub(crate) struct Standing {
     pub(crate) rivals: Vec<Rival>,
 }
 
+/// What is known of each effect of the set that stays.
+pub(crate) struct Settled {
+    /// The held-out errors without it, by target.
+    pub(crate) without: Vec<Vec<Held>>,
+    /// Its parameters, as they are reported.
+    pub(crate) estimates: Vec<Vec<Estimate>>,
+}
+
 impl Standing {
     /// What the rounds of the search have left.
     pub(crate) fn of(best: Candidate, errors: Vec<Held>, rounds: Vec<Round>) -> Self {
@@ -61,14 +69,8 @@ impl Standing {
         Some(asked.contested)
     }
 
-    /// Lets go what has no ground beside the others, one after the other, and adds what is left without a name. Says for each effect that stays the
-    /// held-out errors without it, and its parameters.
-    pub(crate) fn settle(
-        &mut self,
-        ground: Ground<'_>,
-        before: &[Held],
-        contested: &[Vec<usize>],
-    ) -> Option<(Vec<Vec<Held>>, Vec<Vec<Estimate>>)> {
+    /// Lets go what has no ground beside the others, one after the other, and adds what is left without a name.
+    pub(crate) fn settle(&mut self, ground: Ground<'_>, before: &[Held], contested: &[Vec<usize>]) -> Option<Settled> {
         let Ground { context, declared, folds, .. } = ground;
         let mut rests_told = false;
         loop {
@@ -92,7 +94,7 @@ impl Standing {
                 let hardly_needed = |k: usize| quoted(context, &placed[k], &self.errors, &without[k]).of_news < NEEDED;
                 goes = (0..estimates.len()).find(|k| is_nothing(context, &placed[*k], &estimates[*k]) && hardly_needed(*k));
             }
-            let Some(mut goes) = goes else { return Some((without, estimates)) };
+            let Some(mut goes) = goes else { return Some(Settled { without, estimates }) };
             // a correction beside which a name makes no sense is no correction
             if is_named(&placed[goes]) {
                 let shares = |p: &Placed| p.instance.channels.iter().any(|c| placed[goes].instance.touches(c));
