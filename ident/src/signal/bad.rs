@@ -16,6 +16,7 @@ mod scale;
 mod spike;
 mod stuck;
 mod unpowered;
+mod unread;
 mod witness;
 
 pub(crate) use curve::Curve;
@@ -131,6 +132,9 @@ pub fn found(log: &Log) -> Vec<SetAside> {
         let Some(column) = log.column(name) else { continue };
         let samples = column.iter().filter(|v| v.is_finite()).count();
         if samples < FEWEST {
+            // a table of levels: nothing stands beside a reading but the load of its own level
+            let events = if SPEED.contains(&name) { unread::found(log, name) } else { Vec::new() };
+            of_channels.push((name, column, events));
             continue;
         }
         let lost = if SPEED.contains(&name) { of_probe(&mut witnesses, name) } else { Vec::new() };

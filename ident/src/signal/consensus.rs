@@ -6,7 +6,7 @@
 //! Units: rev/min.
 //! Reference: specification `formats.md` (primary relations).
 
-use super::stretches::bridge;
+use super::stretches::{CALM_US, bridge};
 use crate::log::board;
 use crate::log::{Log, SPEED};
 use crate::numeric::order::median;
@@ -80,7 +80,7 @@ pub(crate) fn of(log: &Log) -> Fused {
     }
     let dropped = remove_dropouts(&mut rpm, scale);
     let sd = bridge_by_command(log, &mut rpm);
-    let unread = unread(&rpm);
+    let unread = unread(&rpm, log.column("pulse_us"));
     let bridged_rows = dropped + sd.iter().filter(|sd| **sd > 0.0).count();
     let how = Consensus {
         channels: kept.iter().map(|s| (*s).to_owned()).collect(),
@@ -116,13 +116,20 @@ fn bridge_by_command(log: &Log, rpm: &mut [f64]) -> Vec<f64> {
     sd
 }
 
-/// Rows without a speed between readings that are far apart: a straight line says nothing of when the rotor went from the one to the other. None
-/// where the speed is logged on some rows only: there lines are all there is.
-fn unread(rpm: &[f64]) -> Vec<usize> {
+/// Rows without a speed between readings that are far apart: a straight line says nothing of when the rotor went from the one to the other. So before
+/// the first reading and behind the last one, where the command is another than there. None where the speed is logged on some rows only: there
+/// lines are all there is.
+fn unread(rpm: &[f64], pulse: Option<&[f64]>) -> Vec<usize> {
     let measured: Vec<usize> = (0..rpm.len()).filter(|i| rpm[*i].is_finite()).collect();
+    let (Some(first), Some(last)) = (measured.first().copied(), measured.last().copied()) else { return Vec::new() };
+    if measured.len() * 2 <= rpm.len() {
+        return Vec::new();
+    }
+    let another = |i: usize, reading: usize| pulse.is_some_and(|p| (p[i] - p[reading]).abs() > CALM_US);
     let far = |a: usize, b: usize| (rpm[a] - rpm[b]).abs() > FAR * rpm[a].max(rpm[b]);
     let between = measured.windows(2).filter(|w| far(w[0], w[1])).flat_map(|w| w[0] + 1..w[1]);
-    if measured.len() * 2 > rpm.len() { between.collect() } else { Vec::new() }
+    let behind = (last + 1..rpm.len()).filter(|i| another(*i, last));
+    (0..first).filter(|i| another(*i, first)).chain(between).chain(behind).collect()
 }
 
 /// One sensor of the speed.
@@ -270,16 +277,21 @@ mod tests {
         }
     }
 
-    /// Rows without a reading between two levels are unread; those of a level, and those of a speed that is seldom logged, are lines.
+    /// Rows without a reading between two levels are unread, and those of another command at the ends; those of a level, and those of a speed that is
+    /// seldom logged, are lines.
     #[test]
     fn nobody_has_read_the_rows_between_two_levels() {
         let levels: Vec<f64> = (0..60).map(|i| if i < 30 { 1000.0 } else { 4000.0 }).collect();
+        let pulse: Vec<f64> = (0..60)
+            .map(|i| [1100.0, 1200.0, 1400.0, 1500.0][usize::from(i > 0) + usize::from(i > 29) + usize::from(i > 58)])
+            .collect();
         let without = |rows: &[usize]| {
             let mut rpm = levels.clone();
             rows.iter().for_each(|row| rpm[*row] = f64::NAN);
-            unread(&rpm)
+            unread(&rpm, Some(&pulse))
         };
         assert_eq!(without(&[10, 30, 31, 50]), vec![30, 31]);
+        assert_eq!(without(&[0, 1, 2, 58, 59]), vec![0, 59]);
         assert_eq!(without(&(0..60).filter(|i| i % 3 > 0).collect::<Vec<_>>()), Vec::<usize>::new());
     }
 
