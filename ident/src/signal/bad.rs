@@ -12,6 +12,7 @@ mod dropout;
 mod excursion;
 mod first_turns;
 mod last_turns;
+mod old;
 mod scale;
 mod spike;
 mod stuck;
@@ -137,6 +138,8 @@ pub fn found(log: &Log) -> Vec<SetAside> {
             of_channels.push((name, column, events));
             continue;
         }
+        let old = if SPEED.contains(&name) { old::found(log, name) } else { Vec::new() };
+        witnesses.take_out(name, &old);
         let lost = if SPEED.contains(&name) { of_probe(&mut witnesses, name) } else { Vec::new() };
         let off = if name == CHANNEL_OF_SUPPLY { unpowered::found(log) } else { Vec::new() };
         witnesses.take_out(name, &off);
@@ -151,7 +154,7 @@ pub fn found(log: &Log) -> Vec<SetAside> {
             events.extend(more);
         }
         let (mut events, recurring) = of_no_effect(name, column, events, samples, Probes { speeds, lost: lost.len() });
-        events.extend(lost.into_iter().chain(off));
+        events.extend(lost.into_iter().chain(off).chain(old));
         events.sort_by_key(|e| e.rows.start);
         witnesses.settle(name, &events);
         kept.extend(recurring.iter().filter_map(|e| Some(SetAside { recurs: true, ..told(log, name, column, e)? })));
