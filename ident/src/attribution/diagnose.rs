@@ -1,8 +1,8 @@
 //! From the residual to its cause.
 //!
-//! What it is: every effect of the library is fitted to the log, alone and added to what was found already ([`super::round`]); the winner must
-//! pay for its parameters, predict held-out rows better, and make physical sense ([`super::choose`]); a flexible opponent without a name stands
-//! against it. Then every name is asked again beside all others ([`super::revise`], [`super::standing`]), and how sure it is ([`super::sure`]).
+//! What it is: every effect of the library is fitted to the log, alone and added to what was found already (`round`); the winner must
+//! pay for its parameters, predict held-out rows better, and make physical sense (`choose`); a flexible opponent without a name stands
+//! against it. Then every name is asked again beside all others (`revise`, `standing`), and how sure it is (`sure`).
 //! What can go wrong: on a schedule that cannot tell two effects apart the verdict is `ambiguous`; where only the opponent
 //! explains the residual it is `unattributed`.
 //! Units: evidence in nats.

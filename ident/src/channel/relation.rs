@@ -24,7 +24,7 @@ pub enum Relation {
     Thrust,
     /// rms of the strain from rpm: quadratic. Evidence only; no verdict speaks of it.
     ThrustRms,
-    /// one speed channel less the consensus of at least three: a constant and the sensor's own gain (see [`GAIN_SD`]). Evidence only; no
+    /// one speed channel less the consensus of at least three: a constant and the sensor's own gain (`GAIN_SD`). Evidence only; no
     /// verdict speaks of it.
     SpeedDifference,
 }

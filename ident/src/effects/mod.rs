@@ -184,7 +184,7 @@ pub trait Effect: Sync {
         Vec::new()
     }
     /// The ways in which this log may hold it without being able to show it: never named, but listed with an unknown cause where
-    /// they explain it (see [`crate::attribution::suspects`]).
+    /// they explain it (`attribution/suspects.rs`).
     fn suspects(&self, _context: &Context) -> Vec<Instance> {
         Vec::new()
     }

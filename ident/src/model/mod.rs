@@ -66,7 +66,7 @@ pub struct AddedEffect {
     pub estimates: Vec<Estimate>,
     /// For each channel the polynomial that stands for it on another run, in the order of the declared coefficients; empty where it acts there.
     pub mean: Vec<(String, Vec<f64>)>,
-    /// What its run has shown of it, channel by channel: how far it is believed beyond ([`reach`]).
+    /// What its run has shown of it, channel by channel: how far it is believed beyond (`reach.rs`).
     pub reach: Vec<Reach>,
     /// Standard errors of its shapes, in their order; empty where they are not known.
     pub shape_errors: Vec<f64>,
@@ -99,7 +99,7 @@ pub struct Model {
     pub effects: Vec<AddedEffect>,
     /// Density of the air over that of ISO 2533 air at 20 degC, the mean of the run that the model was identified from, where its log tells.
     pub air: Option<f64>,
-    /// For each channel that follows the supply the voltage of the model's own run by load ([`supply`]).
+    /// For each channel that follows the supply the voltage of the model's own run by load (`supply.rs`).
     pub supply: Vec<(String, Vec<(f64, f64)>)>,
     /// For each channel what the model leaves over of the run that it was identified from, where that is known.
     pub leftovers: Vec<(String, Leftover)>,
@@ -252,7 +252,7 @@ impl Model {
         self
     }
 
-    /// Its effects that a board told ([`crate::close::marks`]): no prediction holds them, so no fit and no comparison of runs does.
+    /// Its effects that a board told (`close/marks.rs`): no prediction holds them, so no fit and no comparison of runs does.
     pub fn told_by_the_board(&self) -> impl Iterator<Item = &AddedEffect> {
         self.effects.iter().filter(|e| e.placed.instance.form == TOLD_BY_THE_BOARD)
     }

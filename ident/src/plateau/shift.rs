@@ -49,7 +49,7 @@ pub struct Filters {
     pub threshold: f64,
     /// Offset in force.
     pub offset: usize,
-    /// |x[n+1] - x[n]|, one less than the samples; NaN beside a missing sample.
+    /// `|x[n+1] - x[n]|`, one less than the samples; NaN beside a missing sample.
     pub one: Vec<f64>,
     /// Filter 1 at or below the threshold.
     pub two: Vec<bool>,

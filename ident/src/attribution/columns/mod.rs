@@ -1,8 +1,8 @@
 //! From channels and what may be behind them to names, errors before and after, and what is left.
 //!
 //! What it is: four stages, each a function from values to a value, that know channels and columns only:
-//! [`ask`] (candidates: what could join, and what this log can show) -> [`posterior`] (which hypothesis, how sure) -> [`held_out`]
-//! (validation on readings that no fit saw) -> [`conclude`] (what is said). A [`Library`] brings the causes of a kind of log; flights are the
+//! [`ask`] (candidates: what could join, and what this log can show) -> [`posterior()`] (which hypothesis, how sure) -> [`held_out`]
+//! (validation on readings that no fit saw) -> [`conclude()`] (what is said). A [`Library`] brings the causes of a kind of log; flights are the
 //! first that does.
 //! What can go wrong: a channel with too few readings is left out by who makes it; a log on which nothing can be shown ends without a name.
 //! Units: those of the channels; evidence in nats.
