@@ -88,7 +88,9 @@ impl Display for Angles {
     }
 }
 
-fn name(sensor: ImuSensor) -> &'static str {
+/// The word for a sensor, as commands say it.
+#[must_use]
+pub fn name(sensor: ImuSensor) -> &'static str {
     match sensor {
         ImuSensor::Gyro => "gyro",
         ImuSensor::Accel => "accel",

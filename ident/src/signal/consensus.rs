@@ -6,7 +6,7 @@
 //! Units: rev/min.
 //! Reference: specification `formats.md` (primary relations).
 
-use super::stretches::{CALM_US, bridge};
+use super::stretches::{CALM_US, bridge, far};
 use crate::log::board;
 use crate::log::{Log, SPEED};
 use crate::numeric::order::median;
@@ -27,9 +27,6 @@ pub struct Consensus {
 
 /// Fewest rows in a row without a speed that the command bridges: fewer are a straight line.
 const STRETCH: usize = 4;
-
-/// Part of the higher one by which two readings are far apart: halfway between them a line may be off by half of it, and a load by all of it.
-const FAR: f64 = 0.1;
 
 /// Share within which healthy sensors on real rigs agree (specification `rig.md`).
 const HEALTHY: f64 = 0.01;
@@ -126,8 +123,7 @@ fn unread(rpm: &[f64], pulse: Option<&[f64]>) -> Vec<usize> {
         return Vec::new();
     }
     let another = |i: usize, reading: usize| pulse.is_some_and(|p| (p[i] - p[reading]).abs() > CALM_US);
-    let far = |a: usize, b: usize| (rpm[a] - rpm[b]).abs() > FAR * rpm[a].max(rpm[b]);
-    let between = measured.windows(2).filter(|w| far(w[0], w[1])).flat_map(|w| w[0] + 1..w[1]);
+    let between = measured.windows(2).filter(|w| far(rpm[w[0]], rpm[w[1]])).flat_map(|w| w[0] + 1..w[1]);
     let behind = (last + 1..rpm.len()).filter(|i| another(*i, last));
     (0..first).filter(|i| another(*i, first)).chain(between).chain(behind).collect()
 }

@@ -43,6 +43,14 @@ pub(crate) const FEWEST_OF_A_KIND: usize = 10;
 /// Time steps that are a gap.
 pub(crate) const GAP: f64 = 5.0;
 
+/// Part of the higher one by which two speeds are far apart: halfway between them a line may be off by half of it, and a load by all of it.
+const FAR: f64 = 0.1;
+
+/// Whether two speeds are far apart.
+pub(crate) fn far(a: f64, b: f64) -> bool {
+    (a - b).abs() > FAR * a.max(b)
+}
+
 /// Rows in which a rotor that follows its command has gone a good part of its way.
 const ON_ITS_WAY: usize = 20;
 /// Part of that way within which a rotor has not set out yet.

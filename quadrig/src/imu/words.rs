@@ -6,7 +6,7 @@
 //! Units: said at each line.
 //! Reference: docs/ahrs.md, "At the board".
 
-use firmware_ahrs::text;
+use firmware_ahrs::text::{self, name};
 use frame::{Command, Event, ImuCommand, ImuErrors, ImuFormat, ImuRefusal, ImuReport, ImuSensor, Message};
 
 /// Ticks of the board's timer in a millisecond.
@@ -26,15 +26,6 @@ pub(super) fn known(typed: &str) -> String {
         .split("; ")
         .find(|w| w.split(' ').next() == Some(first))
         .map_or_else(|| WORDS.to_owned(), |alike| format!("\"{alike}\""))
-}
-
-fn name(sensor: ImuSensor) -> &'static str {
-    match sensor {
-        ImuSensor::Gyro => "gyro",
-        ImuSensor::Accel => "accel",
-        ImuSensor::Mag => "mag",
-        ImuSensor::Alignment => "align",
-    }
 }
 
 fn position(index: u8) -> String {

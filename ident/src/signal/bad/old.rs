@@ -9,16 +9,12 @@
 use super::excursion::Event;
 use crate::log::Log;
 use crate::numeric::order::usual_step;
-use crate::signal::stretches::GAP;
+use crate::signal::stretches::{GAP, far};
 
-/// Part of the higher one by which two readings of neighbouring rows are far apart: a rotor that goes so far within a row has gone farther in the pause.
-const FAR: f64 = 0.1;
-
-/// The rows right behind a pause whose next one is far from them: the rotor was on its way.
+/// The rows right behind a pause whose next one is far from them: a rotor that goes so far within a row has gone farther in the pause.
 pub(super) fn found(log: &Log, name: &str) -> Vec<Event> {
     let Some(speed) = log.column(name) else { return Vec::new() };
     let (t, pause) = (&log.t, GAP * usual_step(&log.t));
-    let far = |a: f64, b: f64| (a - b).abs() > FAR * a.max(b);
     let is_old = |i: &usize| t[*i] - t[*i - 1] > pause && t[*i + 1] - t[*i] < pause && far(speed[*i], speed[*i + 1]);
     let between = |i: usize| speed[i - 1] + (speed[i + 1] - speed[i - 1]) * (t[i] - t[i - 1]) / (t[i + 1] - t[i - 1]);
     (1..speed.len().saturating_sub(1))
