@@ -11,6 +11,7 @@ pub mod attitude;
 pub mod autopilot;
 pub mod body;
 pub mod ground;
+mod rotors;
 pub mod vehicle;
 pub mod vibration;
 pub mod wind;

@@ -2,22 +2,19 @@
 //!
 //! What it is: one millisecond at a time, the powerplants advance by their ten steps, the wind moves on, and the body by one
 //! Runge-Kutta step that sees thrust, reaction and spin of the rotors at the beginning, the middle and the end of the millisecond.
-//! What can go wrong: an airframe without mass ([`Vehicle::new`] gives nothing); a rotor that gives a NaN or a negative speed rests.
+//! What can go wrong: an airframe without mass ([`Vehicle::new`] gives nothing).
 //! Units: SI; us for pulses, rev/min for rotor speed.
-//! Reference: specification `flight.md`, "The body"; errata 2.15-2.30 (moments), 2.37 (drag), ISO 2533 (density with altitude).
+//! Reference: specification `flight.md`, "The body"; errata 2.37 (drag), ISO 2533 (density with altitude).
 
+use super::rotors::{Lift, Rotors};
 use super::wind::{Blowing, Wind};
 use super::{Acting, Airframe, G, Ground, Motion, RigidBody, Vector};
-use crate::plant::powerplant::STEPS_PER_MS;
-use crate::plant::rig_plant::RPM_PER_RAD_S;
-use crate::plant::{Air, PlantBlock, PlantLevers, PlantState, Powerplant};
+use crate::plant::{Air, PlantLevers, PlantState, Powerplant};
 
 /// Step of the body, s.
 const STEP_S: f64 = 1.0e-3;
 /// What rounding leaves of the height of a point on the ground, m.
 const SURFACE_M: f64 = 1.0e-9;
-/// Step of the powerplants, s.
-const ROTOR_STEP_S: f64 = STEP_S / STEPS_PER_MS as f64;
 
 /// Surroundings of a flight.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -41,20 +38,26 @@ impl Surroundings {
     }
 }
 
-/// What a rotor does to the body at one instant.
-#[derive(Debug, Clone, Copy, Default)]
-struct Push {
-    thrust_n: f64,
-    torque_nm: f64,
-    speed: f64,
+/// Density in a layer of one metre, linear in height: less than one part in 1e8 off, and no power to take each millisecond.
+#[derive(Debug, Clone, Copy)]
+struct Layer {
+    floor_m: f64,
+    at_floor: f64,
+    per_m: f64,
 }
 
-/// Sum of the rotors: lift along -z, moment, spin.
-#[derive(Debug, Clone, Copy, Default)]
-struct Lift {
-    thrust_n: f64,
-    moment: Vector,
-    spin: f64,
+impl Layer {
+    const UNKNOWN: Self = Self { floor_m: f64::NAN, at_floor: f64::NAN, per_m: f64::NAN };
+
+    /// Density at `up_m`, kg/m^3, in the layer that it lies in.
+    fn density(&mut self, around: &Surroundings, up_m: f64) -> f64 {
+        let floor_m = up_m.floor();
+        if floor_m != self.floor_m {
+            let at_floor = around.density(floor_m);
+            *self = Self { floor_m, at_floor, per_m: around.density(floor_m + 1.0) - at_floor };
+        }
+        self.at_floor + (up_m - floor_m) * self.per_m
+    }
 }
 
 /// What is really there at one instant of a flight.
@@ -82,11 +85,14 @@ pub struct Vehicle {
     body: RigidBody,
     ground: Ground,
     around: Surroundings,
+    layer: Layer,
+    /// Density where it is, kg/m^3.
+    density: f64,
     /// Density at which the powerplants were set up.
     reference_density: f64,
-    plants: Vec<Box<dyn Powerplant>>,
-    states: Vec<PlantState>,
-    pulses_us: Vec<f64>,
+    rotors: Rotors,
+    /// No rotor lies further from the centre of gravity, m.
+    reach_m: f64,
     lift: Lift,
     wind: Wind,
     blows: Vector,
@@ -107,11 +113,14 @@ impl Vehicle {
         if plants.len() != airframe.rotors.len() {
             return None;
         }
+        let mut layer = Layer::UNKNOWN;
         Some(Self {
+            density: layer.density(&around, -start.place.z),
+            layer,
             body: airframe.body()?,
             ground: Ground::under(airframe.mass_kg, airframe.rotors.len()),
-            states: vec![PlantState::default(); plants.len()],
-            pulses_us: vec![1000.0; plants.len()],
+            rotors: Rotors::new(plants),
+            reach_m: airframe.rotors.iter().map(|r| Vector::from(r.place).norm()).fold(0.0, f64::max) + SURFACE_M,
             wind: Wind::new(&around.blowing, around.seed),
             blows: Vector::from(around.blowing.steady),
             lift: Lift::default(),
@@ -120,7 +129,6 @@ impl Vehicle {
             airframe,
             around,
             reference_density,
-            plants,
         })
     }
 
@@ -128,7 +136,8 @@ impl Vehicle {
     pub fn spin_up(&mut self, pulses_us: &[f64], seconds: f64) {
         let steps = (seconds / STEP_S) as u64;
         for left in (1..=steps).rev() {
-            self.turn_rotors(pulses_us, -(left as f64) * STEP_S);
+            let levers = self.levers(-(left as f64) * STEP_S);
+            [_, self.lift] = self.rotors.millisecond(&self.airframe, pulses_us, &levers);
         }
     }
 
@@ -151,19 +160,19 @@ impl Vehicle {
 
     /// One millisecond with a pulse for each rotor; a rotor without one gets the lowest.
     pub fn millisecond(&mut self, pulses_us: &[f64]) {
-        let begins = self.lift;
-        let [middle, ends] = self.turn_rotors(pulses_us, self.milliseconds as f64 * STEP_S);
-        self.blows = self.wind.advance();
-        let density = self.around.density(-self.motion.place.z);
+        let (begins, from) = (self.lift, self.motion);
+        let levers = self.levers(self.t_s());
+        let [middle, ends] = self.rotors.millisecond(&self.airframe, pulses_us, &levers);
+        (self.lift, self.blows) = (ends, self.wind.advance());
         let lifts = [begins, middle, ends];
-        let from = self.motion;
-        self.motion = self.body.step(&from, STEP_S, |share, at| self.acting(&lifts[(2.0 * share) as usize], at, density));
+        self.motion = self.body.step(&from, STEP_S, |share, at| self.acting(&lifts[(2.0 * share) as usize], at));
+        self.density = self.layer.density(&self.around, -self.motion.place.z);
         self.milliseconds += 1;
     }
 
     /// What acts in a motion: weight, thrust, drag, ground.
-    fn acting(&self, lift: &Lift, at: &Motion, density: f64) -> Acting {
-        let (air, floor) = self.outside(at, density);
+    fn acting(&self, lift: &Lift, at: &Motion) -> Acting {
+        let (air, floor) = self.outside(at);
         let thrust = at.attitude * Vector::new(0.0, 0.0, -lift.thrust_n);
         let weight = Vector::new(0.0, 0.0, self.airframe.mass_kg * G);
         let (push, moment) = floor;
@@ -171,10 +180,13 @@ impl Vehicle {
     }
 
     /// Drag, and push and moment of the ground.
-    fn outside(&self, at: &Motion, density: f64) -> (Vector, (Vector, Vector)) {
+    fn outside(&self, at: &Motion) -> (Vector, (Vector, Vector)) {
         let through = at.velocity - self.blows;
-        let air = through * (-0.5 * density * self.airframe.drag_area_m2 * through.norm());
+        let air = through * (-0.5 * self.density * self.airframe.drag_area_m2 * through.norm());
         let mut floor = (Vector::zeros(), Vector::zeros());
+        if at.place.z < -self.reach_m {
+            return (air, floor);
+        }
         for rotor in &self.airframe.rotors {
             let arm = Vector::from(rotor.place);
             let turned = at.attitude * arm;
@@ -188,25 +200,10 @@ impl Vehicle {
         (air, floor)
     }
 
-    /// Rotors for a millisecond; their sum at its middle and its end.
-    fn turn_rotors(&mut self, pulses_us: &[f64], run_s: f64) -> [Lift; 2] {
-        let thinner = self.around.density(-self.motion.place.z) / self.reference_density;
-        let levers = PlantLevers { run_s, thrust_factor: thinner, torque_factor: thinner, ..PlantLevers::default() };
-        let mut sums = [Lift::default(); 2];
-        let mut block = PlantBlock::default();
-        for (i, plant) in self.plants.iter_mut().enumerate() {
-            let pulse = pulses_us.get(i).copied().filter(|p| p.is_finite()).unwrap_or(1000.0);
-            self.pulses_us[i] = pulse;
-            plant.adjust(&levers);
-            plant.advance_block(ROTOR_STEP_S, pulse, &mut block, &mut || ());
-            for (sum, at) in sums.iter_mut().zip([STEPS_PER_MS / 2 - 1, STEPS_PER_MS - 1]) {
-                let push = Push { thrust_n: block.thrust_n[at], torque_nm: block.torque_nm[at], speed: block.rpm[at] };
-                self.airframe.rotors[i].add(push, self.airframe.rotor_inertia_kgm2, sum);
-            }
-            self.states[i] = block.last;
-        }
-        self.lift = sums[1];
-        sums
+    /// What the air does to the rotors, `run_s` after the start.
+    fn levers(&self, run_s: f64) -> PlantLevers {
+        let thinner = self.density / self.reference_density;
+        PlantLevers { run_s, thrust_factor: thinner, torque_factor: thinner, ..PlantLevers::default() }
     }
 
     /// Where it is and how it moves.
@@ -225,7 +222,8 @@ impl Vehicle {
     #[must_use]
     pub fn on_ground(&self) -> bool {
         let m = &self.motion;
-        self.airframe.rotors.iter().any(|r| m.place.z + (m.attitude * Vector::from(r.place)).z > 0.0)
+        m.place.z >= -self.reach_m
+            && self.airframe.rotors.iter().any(|r| m.place.z + (m.attitude * Vector::from(r.place)).z > 0.0)
     }
 
     /// The airframe.
@@ -237,13 +235,13 @@ impl Vehicle {
     /// What each rotor does.
     #[must_use]
     pub fn rotors(&self) -> &[PlantState] {
-        &self.states
+        self.rotors.states()
     }
 
     /// Specific force at the centre of gravity, m/s^2, and angular acceleration, rad/s^2, in body axes.
     #[must_use]
     pub fn felt(&self) -> (Vector, Vector) {
-        let acting = self.acting(&self.lift, &self.motion, self.around.density(-self.motion.place.z));
+        let acting = self.acting(&self.lift, &self.motion);
         let felt = acting.force / self.airframe.mass_kg - Vector::new(0.0, 0.0, G);
         (self.motion.attitude.inverse() * felt, self.body.angular_acceleration(&self.motion.rate, &acting))
     }
@@ -257,22 +255,26 @@ impl Vehicle {
             motion: self.motion,
             specific_force,
             angular_acceleration,
-            pulses_us: self.pulses_us.clone(),
-            rotors: self.states.clone(),
+            pulses_us: self.rotors.pulses_us().collect(),
+            rotors: self.rotors.states().to_vec(),
             wind: self.blows,
         }
     }
 }
 
-impl super::Rotor {
-    /// Adds what it does: lift, its moment about the middle (-y T, x T), its reaction against its turning, its spin.
-    fn add(&self, push: Push, inertia_kgm2: f64, sum: &mut Lift) {
-        let Push { thrust_n, torque_nm, speed } = push;
-        if !(speed >= 0.0 && thrust_n.is_finite() && torque_nm.is_finite()) {
-            return;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Up and down through the layers, on a warm day above a high field.
+    #[test]
+    fn density_in_a_layer_is_that_of_the_atmosphere() {
+        let around = Surroundings { ground_altitude_m: 1700.0, temperature_offset_k: 12.0, ..Surroundings::default() };
+        let mut layer = Layer::UNKNOWN;
+        for i in -200..2000 {
+            let up_m = 40.0 * f64::sin(f64::from(i) * 0.37) + 0.013 * f64::from(i);
+            let exact = around.density(up_m);
+            assert!((layer.density(&around, up_m) / exact - 1.0).abs() < 1e-8, "{up_m} m");
         }
-        sum.thrust_n += thrust_n;
-        sum.moment += Vector::new(-self.place[1] * thrust_n, self.place[0] * thrust_n, -self.turns * torque_nm);
-        sum.spin += self.turns * inertia_kgm2 * speed / RPM_PER_RAD_S;
     }
 }

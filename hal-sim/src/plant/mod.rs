@@ -24,7 +24,7 @@ pub mod powerplant;
 pub mod propeller;
 pub mod rig_plant;
 pub mod room_air;
-mod shaft;
+pub mod shaft;
 pub mod supply;
 pub mod thermal;
 

@@ -7,6 +7,7 @@
 //! Reference: specification `closing-the-loop.md`, step 9.
 
 use super::parts::Parts;
+use super::shaft::{Begun, Turns};
 
 /// What the powerplant does at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -60,10 +61,27 @@ pub trait Powerplant: Send {
     /// Ten steps of `dt_s` at one pulse: the same numbers as ten times [`Powerplant::advance`].
     /// `meanwhile` is work that needs nothing of them, done once: beside steps that wait for one another it takes next to no time.
     fn advance_block(&mut self, dt_s: f64, pulse_us: f64, out: &mut PlantBlock, meanwhile: &mut dyn FnMut()) {
+        if let Some(begun) = self.begin(dt_s, pulse_us) {
+            let mut turns = Turns::default();
+            begun.turn(&mut turns, meanwhile);
+            return self.end(&begun, &turns, out);
+        }
         for i in 0..STEPS_PER_MS {
             out.put(i, self.advance(dt_s, pulse_us));
         }
         meanwhile();
+    }
+
+    /// Begins such a block where nothing but the shaft moves in it, so that its steps can be taken beside those of others; `None`, and
+    /// nothing has moved, where more does. [`Powerplant::end`] is due next.
+    fn begin(&mut self, dt_s: f64, pulse_us: f64) -> Option<Begun> {
+        let _ = (dt_s, pulse_us);
+        None
+    }
+
+    /// Ends the block with the steps that its shaft has taken.
+    fn end(&mut self, begun: &Begun, turns: &Turns, out: &mut PlantBlock) {
+        let _ = (begun, turns, out);
     }
 
     /// Takes what the effects make of the plant at this moment. A model that is not made of parts ignores it.

@@ -13,7 +13,7 @@ use super::limiter::LimiterState;
 use super::parts::Parts;
 use super::powerplant::{BackEmf, PlantBlock, PlantLevers, PlantState, Powerplant, STEPS_PER_MS};
 use super::room_air::Draught;
-use super::shaft::{Acting, Shaft, Turns, show};
+use super::shaft::{Acting, Begun, Shaft, Turns, show};
 use super::thermal::ThermalState;
 use crate::noise::{Coloured, Source, Stream};
 use core::f64::consts::TAU;
@@ -66,8 +66,6 @@ pub struct RigPlant {
     motor_a: f64,
     supply_a: f64,
     charge_as: f64,
-    /// The steps of the last block; their place is kept.
-    turns: Turns,
 }
 
 /// Interval and correlation time of the gusts, s.
@@ -99,7 +97,6 @@ impl RigPlant {
             motor_a: 0.0,
             supply_a: ESC_IDLE_A,
             charge_as: 0.0,
-            turns: Turns::default(),
             fixed: Fixed::of(&parts),
             parts,
         }
@@ -173,23 +170,6 @@ impl RigPlant {
         Shaft::new(acting, dt_s)
     }
 
-    /// The ten steps of a millisecond at a steady duty.
-    fn whole_block(&mut self, dt_s: f64, duty: f64, out: &mut PlantBlock, meanwhile: &mut dyn FnMut()) {
-        let shaft = self.shaft(dt_s);
-        shaft.turns(self.speed, &mut self.turns, meanwhile);
-        let turns = &self.turns;
-        let mut motor_a = [0.0; STEPS_PER_MS];
-        show(&shaft, turns, &mut out.rpm, &mut out.thrust_n, &mut out.torque_nm, &mut motor_a);
-        for motor_a in motor_a {
-            self.supply_a = duty * motor_a + ESC_IDLE_A;
-            self.charge_as += self.supply_a * dt_s;
-            self.elapsed_s += dt_s;
-        }
-        self.motor_a = motor_a[STEPS_PER_MS - 1];
-        self.speed = turns.speed[STEPS_PER_MS - 1];
-        self.steps = SLOW_STEPS;
-    }
-
     /// State of the outside at the speed, torque and currents of now.
     fn state(&self, thrust_n: f64, torque_nm: f64) -> PlantState {
         PlantState {
@@ -244,19 +224,28 @@ impl Powerplant for RigPlant {
         self.state(thrust_n, torque_nm)
     }
 
-    fn advance_block(&mut self, dt_s: f64, pulse_us: f64, out: &mut PlantBlock, meanwhile: &mut dyn FnMut()) {
+    fn begin(&mut self, dt_s: f64, pulse_us: f64) -> Option<Begun> {
         let begins = self.steps == 0 || self.steps >= SLOW_STEPS;
         if !begins || !self.parts.limiter.is_steady() {
-            for i in 0..STEPS_PER_MS {
-                out.put(i, self.advance(dt_s, pulse_us));
-            }
-            meanwhile();
-            return;
+            return None;
         }
         // From here to the end of the millisecond nothing but the shaft moves.
         let duty = self.limiter.duty(&self.parts.limiter, pulse_us, dt_s);
         self.settle(duty);
-        self.whole_block(dt_s, duty, out, meanwhile);
+        Some(Begun { shaft: self.shaft(dt_s), from: self.speed, dt_s })
+    }
+
+    fn end(&mut self, begun: &Begun, turns: &Turns, out: &mut PlantBlock) {
+        let mut motor_a = [0.0; STEPS_PER_MS];
+        show(&begun.shaft, turns, &mut out.rpm, &mut out.thrust_n, &mut out.torque_nm, &mut motor_a);
+        for motor_a in motor_a {
+            self.supply_a = self.drive.duty * motor_a + ESC_IDLE_A;
+            self.charge_as += self.supply_a * begun.dt_s;
+            self.elapsed_s += begun.dt_s;
+        }
+        self.motor_a = motor_a[STEPS_PER_MS - 1];
+        self.speed = turns.speed[STEPS_PER_MS - 1];
+        self.steps = SLOW_STEPS;
         out.temp_c = [self.thermal.temperature_c; STEPS_PER_MS];
         out.last = self.state(out.thrust_n[STEPS_PER_MS - 1], out.torque_nm[STEPS_PER_MS - 1]);
     }

@@ -56,10 +56,82 @@ pub(super) struct Acting {
 
 /// Ten steps of the shaft: the speed after each, what was gained in it, and the speed that its rule looked ahead to, rad/s.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Turns {
+pub struct Turns {
     pub(super) speed: [f64; STEPS_PER_MS],
     gained: [f64; STEPS_PER_MS],
     ahead: [f64; STEPS_PER_MS],
+}
+
+/// A millisecond in which nothing but the shaft moves: its ten steps are still to be taken.
+#[derive(Debug, Clone, Copy)]
+pub struct Begun {
+    pub(super) shaft: Shaft,
+    /// Speed at the beginning, rad/s.
+    pub(super) from: f64,
+    pub(super) dt_s: f64,
+}
+
+impl Begun {
+    /// Its ten steps: the numbers of [`Shaft::turn`] one after the other. `meanwhile` is done while they wait for one another.
+    #[inline]
+    pub fn turn(&self, turns: &mut Turns, meanwhile: &mut dyn FnMut()) {
+        let driven = self.is_driven();
+        if driven {
+            self.shaft.drive(self.from, turns);
+        }
+        meanwhile();
+        if !(driven && self.shaft.drove(turns)) {
+            self.shaft.one_by_one(self.from, turns);
+        }
+    }
+
+    fn is_driven(&self) -> bool {
+        self.from > 0.0 && self.shaft.is_driven(self.from)
+    }
+}
+
+/// Shafts whose steps are taken side by side.
+pub const ABREAST: usize = 4;
+
+/// The steps of four shafts side by side: the numbers of [`Begun::turn`], in little more than the time of one.
+pub fn turn_abreast(begun: [&Begun; ABREAST], turns: &mut [Turns; ABREAST]) {
+    let drove = if begun.iter().all(|b| b.is_driven()) { drive_abreast(begun, turns) } else { [false; ABREAST] };
+    for ((begun, turns), drove) in begun.iter().zip(turns).zip(drove) {
+        if !drove {
+            begun.turn(turns, &mut || ());
+        }
+    }
+}
+
+/// [`Shaft::drive`] of four, and which [`Shaft::drove`].
+#[multiversion(targets("x86_64+avx2"))]
+fn drive_abreast(begun: [&Begun; ABREAST], turns: &mut [Turns; ABREAST]) -> [bool; ABREAST] {
+    let each = |of: fn(&Gain) -> f64| begun.map(|b| of(&b.shaft.driven.0));
+    let (standing, damping, air) = (each(|g| g.standing), each(|g| g.damping), each(|g| g.air));
+    let half = |whole: [f64; ABREAST]| whole.map(|x| 0.5 * x);
+    let (half_standing, half_damping, half_air) = (half(standing), half(damping), half(air));
+    let mut from = begun.map(|b| b.from);
+    let mut steps = [[[0.0; ABREAST]; 3]; STEPS_PER_MS];
+    let (mut slowest, mut fastest) = (from, from);
+    for [speed, gained, ahead] in &mut steps {
+        for i in 0..ABREAST {
+            let first = (standing[i] - damping[i] * from[i]) - air[i] * from[i] * from[i];
+            let there = from[i] + first;
+            let second = (half_standing[i] - half_damping[i] * there) - half_air[i] * there * there;
+            from[i] = (from[i] + 0.5 * first) + second;
+            (speed[i], gained[i], ahead[i]) = (from[i], 0.5 * first + second, there);
+            let (low, high) = if from[i] < there { (from[i], there) } else { (there, from[i]) };
+            slowest[i] = if low < slowest[i] { low } else { slowest[i] };
+            fastest[i] = if high > fastest[i] { high } else { fastest[i] };
+        }
+    }
+    for (i, turns) in turns.iter_mut().enumerate() {
+        for (step, [speed, gained, ahead]) in steps.iter().enumerate() {
+            (turns.speed[step], turns.gained[step], turns.ahead[step]) = (speed[i], gained[i], ahead[i]);
+        }
+    }
+    // a speed that is no number stays one up to the last
+    [0, 1, 2, 3].map(|i| from[i] > 0.0 && slowest[i] > 0.0 && begun[i].shaft.is_driven(fastest[i]))
 }
 
 /// The shaft while duty and air stand still.
@@ -121,19 +193,6 @@ impl Shaft {
         (next, if next > 0.0 { 0.5 * first + half } else { stopped(w) })
     }
 
-    /// Ten steps from `w`: the numbers of [`Shaft::turn`] one after the other. `meanwhile` is done while they wait for one another.
-    #[inline]
-    pub(super) fn turns(&self, w: f64, turns: &mut Turns, meanwhile: &mut dyn FnMut()) {
-        let driven = w > 0.0 && self.is_driven(w);
-        if driven {
-            self.drive(w, turns);
-        }
-        meanwhile();
-        if !(driven && self.drove(turns)) {
-            self.one_by_one(w, turns);
-        }
-    }
-
     /// Ten steps of a rotor that turns and is driven all the way: nothing is asked in between, so that the chain of the steps is short
     /// enough for the processor to see beyond it.
     #[inline]
@@ -190,22 +249,21 @@ impl Shaft {
 pub(super) fn show(
     shaft: &Shaft,
     turns: &Turns,
-    rpm: &mut [f64],
-    thrust_n: &mut [f64],
-    torque_nm: &mut [f64],
-    motor_a: &mut [f64],
+    rpm: &mut [f64; STEPS_PER_MS],
+    thrust_n: &mut [f64; STEPS_PER_MS],
+    torque_nm: &mut [f64; STEPS_PER_MS],
+    motor_a: &mut [f64; STEPS_PER_MS],
 ) {
     let (a, per_step_s) = (shaft.acting, shaft.per_step_s);
-    let places = rpm.iter_mut().zip(thrust_n).zip(torque_nm).zip(motor_a);
-    for ((((rpm, thrust_n), torque_nm), motor_a), (w, gained)) in places.zip(turns.speed.iter().zip(&turns.gained)) {
-        let w = *w;
-        *rpm = w * RPM_PER_RAD_S;
+    for i in 0..STEPS_PER_MS {
+        let (w, gained) = (turns.speed[i], turns.gained[i]);
+        rpm[i] = w * RPM_PER_RAD_S;
         let current = (a.emf_free_v - a.kt * w) * a.per_ohm;
-        *motor_a = if current > 0.0 { current } else { 0.0 };
+        motor_a[i] = if current > 0.0 { current } else { 0.0 };
         let seen_drag = a.seen_share * (a.extra_nm + a.extra_nms * w);
         let seen_drag = if w > 0.0 { seen_drag } else { 0.0 };
-        *thrust_n = a.thrust_k * w * w;
-        *torque_nm = a.air_k * w * w + seen_drag + a.inertia * (gained * per_step_s);
+        thrust_n[i] = a.thrust_k * w * w;
+        torque_nm[i] = a.air_k * w * w + seen_drag + a.inertia * (gained * per_step_s);
     }
 }
 
@@ -270,11 +328,34 @@ mod tests {
             let shaft = Shaft::new(Acting { emf_free_v, ..RIG }, 1.0e-4);
             let (mut w, mut turns) = (from, Turns::default());
             for _ in 0..100 {
-                shaft.turns(w, &mut turns, &mut || ());
+                Begun { shaft, from: w, dt_s: 1.0e-4 }.turn(&mut turns, &mut || ());
                 for (speed, gained) in turns.speed.iter().zip(&turns.gained) {
                     let (next, gain) = shaft.turn(w);
                     assert_eq!((speed.to_bits(), gained.to_bits()), (next.to_bits(), gain.to_bits()), "{emf_free_v} V, {from}");
                     w = next;
+                }
+            }
+        }
+    }
+
+    /// Four side by side do what each does alone: all driven, one that coasts or stops, one at rest, one whose speed is lost.
+    #[test]
+    fn abreast_is_one_by_one() {
+        let some = [(7.0, 300.0), (7.0, 423.9), (7.0, 424.6), (0.0, 600.0), (0.01, 0.03), (0.0, 0.0), (7.0, 0.0), (7.0, f64::NAN)];
+        let begun = |(emf_free_v, from): (f64, f64)| {
+            let shaft = Shaft::new(Acting { emf_free_v, ..RIG }, 1.0e-4);
+            Begun { shaft, from, dt_s: 1.0e-4 }
+        };
+        let bits = |turns: &Turns| (turns.speed.map(f64::to_bits), turns.gained.map(f64::to_bits));
+        for (i, first) in some.iter().enumerate() {
+            for others in [[some[0]; 3], [*first; 3], [some[0], some[(i + 3) % 8], some[(i + 5) % 8]]] {
+                let four = [*first, others[0], others[1], others[2]].map(begun);
+                let mut together = [Turns::default(); ABREAST];
+                turn_abreast(four.each_ref(), &mut together);
+                for (begun, turns) in four.iter().zip(&together) {
+                    let mut alone = Turns::default();
+                    begun.turn(&mut alone, &mut || ());
+                    assert_eq!(bits(turns), bits(&alone), "{first:?} beside {others:?}");
                 }
             }
         }
