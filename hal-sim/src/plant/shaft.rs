@@ -341,7 +341,8 @@ mod tests {
     /// Four side by side do what each does alone: all driven, one that coasts or stops, one at rest, one whose speed is lost.
     #[test]
     fn abreast_is_one_by_one() {
-        let some = [(7.0, 300.0), (7.0, 423.9), (7.0, 424.6), (0.0, 600.0), (0.01, 0.03), (0.0, 0.0), (7.0, 0.0), (7.0, f64::NAN)];
+        let some =
+            [(7.0, 300.0), (7.0, 423.9), (7.0, 424.6), (0.0, 600.0), (0.01, 0.03), (0.0, 0.0), (7.0, 0.0), (7.0, f64::NAN)];
         let begun = |(emf_free_v, from): (f64, f64)| {
             let shaft = Shaft::new(Acting { emf_free_v, ..RIG }, 1.0e-4);
             Begun { shaft, from, dt_s: 1.0e-4 }

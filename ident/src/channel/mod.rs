@@ -12,7 +12,7 @@ use crate::numeric::order::usual_step;
 use crate::signal::bad::{self, SetAside};
 use crate::signal::consensus::{self, Consensus};
 use crate::signal::noise;
-use crate::signal::start::start_pulse;
+use crate::signal::start;
 use crate::signal::stretches::{self, CALM_US, STILL_US, bridge};
 use powers::{Values, powers_of};
 use std::borrow::Cow;
@@ -57,6 +57,10 @@ pub struct Context {
     pub rpm_sd: Vec<f64>,
     /// Rows on which no sensor read the speed while the rotor went from one to another, in order.
     pub(crate) unread: Vec<usize>,
+    /// Rows for which no command is known, in order ([`start::uncommanded`]).
+    pub(crate) uncommanded: Vec<usize>,
+    /// Speed on the rows that tell where the motor starts, rev/min; NaN elsewhere ([`states::told`]).
+    pub(crate) told: Vec<f64>,
     /// Rows before which the log did not see the rotor, in order, and its speed there, rev/min: after gaps in time.
     pub(crate) starts: Vec<(usize, f64)>,
     /// How it was made.
@@ -179,7 +183,9 @@ impl Context {
         let steady = stretches::steady(&log.t, pulse.as_deref(), &rpm, STILL_US);
         let calm = stretches::steady(&log.t, pulse.as_deref(), &rpm, CALM_US);
         let settling = if pulse.is_some() { stretches::settling(&log.t, &rpm, &steady) } else { Vec::new() };
-        let start = start_pulse_us.unwrap_or_else(|| start_pulse(&log.t, pulse.as_deref(), &rpm));
+        let uncommanded = log.column("pulse_us").map(start::uncommanded).unwrap_or_default();
+        let told = states::told(log, &rpm, &uncommanded);
+        let start = start_pulse_us.unwrap_or_else(|| start::start_pulse(&log.t, pulse.as_deref(), &told));
         Self {
             name: log.name.clone(),
             t: log.t.clone(),
@@ -189,6 +195,8 @@ impl Context {
             rpm,
             rpm_sd,
             unread,
+            uncommanded,
+            told,
             consensus,
             set_aside: Vec::new(),
             current: None,

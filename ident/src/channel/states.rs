@@ -7,6 +7,7 @@
 //! Reference: specification `closing-the-loop.md`, step 2 (blocks after gaps).
 
 use super::{Context, Relation, STANDSTILL};
+use crate::log::{Log, SPEED};
 use crate::signal::stretches;
 
 /// Rows at which the rotor's speed is known by itself, whatever came before ([`Context::starts`]).
@@ -21,8 +22,8 @@ pub(super) fn known(t: &[f64], rpm: &[f64], pulse: Option<&[f64]>, start_us: f64
     out
 }
 
-/// Rows at which a relation predicts nothing, in order: a rotor that is told to turn and does not yet, and loads of a speed that nobody read while the
-/// rotor went from one to another.
+/// Rows at which a relation predicts nothing, in order: a rotor that is told to turn and does not yet, or whose command is not known, and loads
+/// of a speed that nobody read while the rotor went from one to another.
 pub(super) fn given(context: &Context, relation: Relation) -> Vec<usize> {
     let Some(pulse) = context.pulse.as_ref().filter(|_| relation == Relation::SpeedFromPulse) else {
         return if relation.is_of_speed() { context.unread.clone() } else { Vec::new() };
@@ -31,13 +32,26 @@ pub(super) fn given(context: &Context, relation: Relation) -> Vec<usize> {
         let stands = context.rpm.get(*row).is_some_and(|r| *r < STANDSTILL);
         stands && pulse[*row] >= context.start_pulse_us
     };
-    context.starts.iter().map(|s| s.0).filter(held_back).collect()
+    let mut out: Vec<usize> = context.starts.iter().map(|s| s.0).filter(held_back).collect();
+    out.extend(&context.uncommanded);
+    out.sort_unstable();
+    out.dedup();
+    out
+}
+
+/// The speed on the rows that tell where the motor starts: those that hold a reading and a command. What is bridged is not known to turn.
+pub(super) fn told(log: &Log, rpm: &[f64], uncommanded: &[usize]) -> Vec<f64> {
+    let columns: Vec<&[f64]> = SPEED.iter().filter_map(|s| log.column(s)).collect();
+    let read = |row: usize| columns.iter().any(|c| c[row].is_finite());
+    let mut out: Vec<f64> = rpm.iter().enumerate().map(|(row, v)| if read(row) { *v } else { f64::NAN }).collect();
+    uncommanded.iter().filter(|row| **row < rpm.len()).for_each(|row| out[*row] = f64::NAN);
+    out
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::{Column, Log};
+    use crate::log::Column;
 
     /// 50 rows a second; told to turn from row 100 on, the rotor sets out 40 rows later.
     #[test]
@@ -68,5 +82,35 @@ mod tests {
         let target = &context.targets[context.target("thrust_n").expect("a channel")];
         assert_eq!(target.given, [150]);
         assert!(!target.claims(150) && target.claims(220), "a level says what its rows read");
+    }
+
+    /// A rotor at its slowest; then the recorder goes on without a command, and somebody has cut the motor. What the sensor gave up on is not known
+    /// to turn, and what stood at the start stood.
+    #[test]
+    fn rows_without_a_command_tell_nothing_of_the_command() {
+        let n = 400;
+        let command = |i: usize| [1000.0, 1300.0, 1031.0, f64::NAN][i / 100];
+        let speed = |i: usize| [0.0, 12_000.0, 1900.0, 0.0][i / 100];
+        let columns = [("pulse_us", (0..n).map(command).collect()), ("rpm", (0..n).map(speed).collect())];
+        let columns = columns.map(|(name, values): (&str, Vec<f64>)| Column { name: name.into(), values }).to_vec();
+        let log = Log { t: (0..n).map(|i| 0.05 * i as f64).collect(), columns, ..Log::default() };
+        let context = Context::new(&log, None);
+        assert_eq!(context.start_pulse_us, 1015.5);
+        let target = &context.targets[context.target("rpm").expect("a channel")];
+        assert!(target.rows.iter().all(|row| *row < 300) && target.given.contains(&350));
+    }
+
+    /// A sensor that gives up on a rotor which coasts: what bridges its silence is not known to turn.
+    #[test]
+    fn a_speed_that_is_bridged_does_not_move_the_start() {
+        let part = |i: usize| [60, 160].partition_point(|from| *from <= i);
+        let coasts = |i: usize| if i < 166 { 12_000.0 - 1500.0 * (i as f64 - 159.0) } else { f64::NAN };
+        let n = 300;
+        let pulse = (0..n).map(|i| [1000.0, 1300.0, 1000.0][part(i)]).collect();
+        let rpm = (0..n).map(|i| [0.0, 12_000.0, coasts(i)][part(i)]).collect();
+        let columns = [("pulse_us", pulse), ("rpm", rpm)];
+        let columns = columns.map(|(name, values): (&str, Vec<f64>)| Column { name: name.into(), values }).to_vec();
+        let log = Log { t: (0..n).map(|i| 0.03 * i as f64).collect(), columns, ..Log::default() };
+        assert_eq!(Context::new(&log, None).start_pulse_us, 1150.0);
     }
 }

@@ -164,11 +164,11 @@ fn declared(runs: &[Run], contexts: &[Context], members: &[Member<'_>]) -> Model
 fn start_pulse<'c>(runs: impl Iterator<Item = &'c Context>) -> f64 {
     let (mut t, mut pulse, mut rpm) = (Vec::new(), Vec::new(), Vec::new());
     for context in runs {
-        let Some(own) = context.pulse.as_ref().filter(|p| p.len() == context.rpm.len()) else { continue };
+        let Some(own) = context.pulse.as_ref().filter(|p| p.len() == context.told.len()) else { continue };
         let shift = t.last().copied().unwrap_or(0.0) - context.t.first().copied().unwrap_or(0.0);
         t.extend(context.t.iter().map(|t| t + shift));
         pulse.extend_from_slice(own);
-        rpm.extend_from_slice(&context.rpm);
+        rpm.extend_from_slice(&context.told);
     }
     start::start_pulse(&t, (!pulse.is_empty()).then_some(&*pulse), &rpm)
 }

@@ -89,11 +89,11 @@ impl SetAside {
         let stuck = if self.stuck { "stuck at " } else { "" };
         match of(places) {
             [value, expected] if value == expected && self.stuck => format!("stuck at {}", trimmed(self.value, places)),
-            _ => {
-                let apart = (places..=DECIMALS).map(of).find(|[value, expected]| value != expected);
-                let [value, expected] = apart.unwrap_or_else(|| of(places));
-                format!("{stuck}{value} where the rest of the log says {expected}")
-            }
+            [shown, _] => match (places..=DECIMALS).map(of).find(|[value, expected]| value != expected) {
+                Some([value, expected]) => format!("{stuck}{value} where the rest of the log says {expected}"),
+                // the last reading of a rotor that is no longer seen, shown on
+                None => format!("{shown}, kept from before"),
+            },
         }
     }
 }
@@ -320,6 +320,7 @@ mod tests {
             (270.71, 270.74, "270.71 where the rest of the log says 270.74"),
             (2080.0, 0.0, "2080 where the rest of the log says 0"),
             (0.0, 511.04, "0 where the rest of the log says 511.0"),
+            (1472.0, 1472.0, "1472, kept from before"),
         ] {
             let told = aside(value, expected, false);
             assert!(told.ends_with(&format!(": {said}; set aside")), "{told}");

@@ -9,7 +9,7 @@
 use crate::log::Log;
 use crate::numeric::order::{median, quantum, usual_step};
 use crate::signal::bad::Curve;
-use crate::signal::start::start_pulse;
+use crate::signal::start::{start_pulse, uncommanded};
 use crate::signal::stretches::{GAP, STILL_US, bridge, starts};
 use std::ops::Range;
 
@@ -58,8 +58,10 @@ pub(crate) struct Drive {
 impl Drive {
     /// What the commands of a log make of a speed; `None` without a command or with too few readings. A missing reading is not finite.
     pub(crate) fn of(log: &Log, speed: &[f64]) -> Option<Self> {
-        let pulse = bridge(&log.t, log.column("pulse_us").filter(|c| c.iter().any(|v| v.is_finite()))?);
-        Self::of_command(&log.t, &pulse, speed)
+        let told = log.column("pulse_us").filter(|c| c.iter().any(|v| v.is_finite()))?;
+        let mut speed = speed.to_vec();
+        uncommanded(told).into_iter().for_each(|row| speed[row] = f64::NAN);
+        Self::of_command(&log.t, &bridge(&log.t, told), &speed)
     }
 
     /// The same of a command without gaps, us.

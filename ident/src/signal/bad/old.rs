@@ -9,17 +9,20 @@
 use super::excursion::Event;
 use crate::log::Log;
 use crate::numeric::order::usual_step;
-use crate::signal::stretches::{GAP, far};
+use crate::signal::stretches::{CALM_US, GAP, far};
 
-/// The rows right behind a pause whose next one is far from them: a rotor that goes so far within a row has gone farther in the pause.
+/// The rows right behind a pause whose next one is far from them: a rotor that goes so far within a row has gone farther in the pause. Not where the
+/// command steps from the one to the other: that is what sends it.
 pub(super) fn found(log: &Log, name: &str) -> Vec<Event> {
     let Some(speed) = log.column(name) else { return Vec::new() };
     let (t, pause) = (&log.t, GAP * usual_step(&log.t));
     let is_old = |i: &usize| t[*i] - t[*i - 1] > pause && t[*i + 1] - t[*i] < pause && far(speed[*i], speed[*i + 1]);
+    let command = log.column("pulse_us");
+    let steps = |i: &usize| command.is_some_and(|p| (p[*i + 1] - p[*i]).abs() > CALM_US);
     let between = |i: usize| speed[i - 1] + (speed[i + 1] - speed[i - 1]) * (t[i] - t[i - 1]) / (t[i + 1] - t[i - 1]);
     (1..speed.len().saturating_sub(1))
         .filter(|i| speed[i - 1..=i + 1].iter().all(|v| v.is_finite()))
-        .filter(is_old)
+        .filter(|i| is_old(i) && !steps(i))
         .map(|i| Event { rows: i..i + 1, worst: i, expected: between(i), at_step: true, silent: false })
         .collect()
 }
@@ -55,5 +58,20 @@ mod tests {
         for target in &context.targets {
             assert!(!target.rows.contains(&40), "no sample of {}", target.name);
         }
+    }
+
+    /// Sweeps of one row a level, with a pause between them: at the lowest level the rotor stands in each, and the next level sends it.
+    #[test]
+    fn a_level_of_one_row_behind_a_pause_is_read() {
+        let mut text = String::from("# quadrig-log 1\nt_s,pulse_us,rpm\n");
+        for sweep in 0..4 {
+            for level in 0..16 {
+                let rpm = if level == 0 { 0 } else { 3000 + 2000 * level - 20 * sweep };
+                text += &format!("{},{},{rpm}\n", 90 * sweep + 4 * level, 1000 + 50 * level);
+            }
+        }
+        let log = Log::parse("run.csv", text.as_bytes()).expect("a log");
+        assert_eq!(found(&log), []);
+        assert_eq!(Context::new(&log, None).start_pulse_us, 1025.0);
     }
 }
