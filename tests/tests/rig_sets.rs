@@ -6,10 +6,12 @@
 //! Units: as in the files; thrust coefficients have none.
 //! Reference: `README.md` of each set; Brandt, Deters, Ananda & Selig, UIUC Propeller Data Site, volume 1.
 
+use ident::channel::Context;
 use ident::close::close;
 use ident::identify::curves::thrust_coefficient;
 use ident::identify::{Identified, identify};
 use ident::log::import::import;
+use ident::signal::bad::SetAside;
 use quadrig_tests::{call, data, files};
 use std::path::Path;
 use tempfile::TempDir;
@@ -91,6 +93,39 @@ fn a_level_that_lifts_was_not_read() {
     let closed = close(&seven, None, &[eleven], &mut |_| {}).expect("a verdict");
     let speed = closed.verdict.validation[0].channels["rpm"];
     assert!(speed.after < 0.8 * speed.before, "{speed:?}");
+}
+
+/// Runs that end with a rotor that coasts, a sensor that gives up on it, and rows without a command; staircases of one row a level whose lowest comes
+/// right behind a pause. None of it moves the pulse at which the motor starts: it stands at 1000 us, and turns at the pulse beside.
+#[test]
+fn the_motor_starts_above_the_pulse_at_which_it_stands() {
+    let Some(data) = data("the 1585 stands") else { return };
+    for (file, turns_us) in [
+        ("stand1585-micro/tidy/TimeConstant_Test_2024-02-06_134515.csv", 1044.0),
+        ("stand1585-micro/tidy/StepsTestV2_2024-02-06_131025.csv", 1026.5),
+        ("stand1585-sov5/tidy/TimeConstant_Test_2023-12-13_130935.csv", 1031.0),
+    ] {
+        let (log, _) = import(&data.join("rig").join(file), &[]).unwrap_or_else(|e| panic!("{e}"));
+        let context = Context::new(&log, None);
+        assert_eq!(context.start_pulse_us, 0.5 * (1000.0 + turns_us), "{file}");
+        let stands = |a: &SetAside| a.channel == "rpm" && a.value == 0.0 && a.expected > 5000.0;
+        assert!(!context.set_aside.iter().any(stands), "{file}: {:?}", context.set_aside);
+    }
+}
+
+/// An efficient motor under an open arm: each sweep ends with the motor off, and the rotor takes a third of a second to half its speed. Four rows a
+/// sweep show it, and they count as much as the steps up.
+#[test]
+fn a_rotor_that_coasts_tells_its_air() {
+    let Some(data) = data("a rotor that coasts") else { return };
+    let file = "rig/dualcell-eco2814c/tidy/grp01__dualsky-eco2814c-v2_graupner-10x6_4s.csv";
+    let (log, _) = import(&data.join(file), &[]).unwrap_or_else(|e| panic!("{e}"));
+    let closed = close(&log, None, &[], &mut |_| {}).expect("a verdict");
+    let lag = closed.verdict.effects.iter().find(|e| e.id == "spinup_lag").expect("a rotor that follows late");
+    let air = lag.parameters.iter().find(|p| p.name == "tau_air").expect("a time of the air");
+    assert!((0.25..0.45).contains(&air.value) && air.ci95[0] > 0.1, "{air:?}");
+    let speed = &closed.verdict.channels["rpm"];
+    assert!(speed.before.heldout_rms > 4.0 * speed.after.heldout_rms, "{speed:?}");
 }
 
 /// The published lever-rig file has neither header nor commas: its columns are named on the command line, by position.
