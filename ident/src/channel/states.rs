@@ -39,11 +39,14 @@ pub(super) fn given(context: &Context, relation: Relation) -> Vec<usize> {
     out
 }
 
-/// The speed on the rows that tell where the motor starts: those that hold a reading and a command. What is bridged is not known to turn.
+/// The speed on the rows that tell where the motor starts: those with a command, from the first reading to the last. What stands beyond them, the
+/// nearest reading held, is not known to turn; a line between two readings is.
 pub(super) fn told(log: &Log, rpm: &[f64], uncommanded: &[usize]) -> Vec<f64> {
     let columns: Vec<&[f64]> = SPEED.iter().filter_map(|s| log.column(s)).collect();
-    let read = |row: usize| columns.iter().any(|c| c[row].is_finite());
-    let mut out: Vec<f64> = rpm.iter().enumerate().map(|(row, v)| if read(row) { *v } else { f64::NAN }).collect();
+    let read = |row: &usize| columns.iter().any(|c| c[*row].is_finite());
+    let (first, last) = ((0..rpm.len()).find(read), (0..rpm.len()).rfind(read));
+    let told = |row: usize| first.is_some_and(|f| f <= row) && last.is_some_and(|l| row <= l);
+    let mut out: Vec<f64> = rpm.iter().enumerate().map(|(row, v)| if told(row) { *v } else { f64::NAN }).collect();
     uncommanded.iter().filter(|row| **row < rpm.len()).for_each(|row| out[*row] = f64::NAN);
     out
 }
@@ -100,9 +103,9 @@ mod tests {
         assert!(target.rows.iter().all(|row| *row < 300) && target.given.contains(&350));
     }
 
-    /// A sensor that gives up on a rotor which coasts: what bridges its silence is not known to turn.
+    /// A sensor that gives up on a rotor which coasts: what is held for its silence is not known to turn.
     #[test]
-    fn a_speed_that_is_bridged_does_not_move_the_start() {
+    fn a_speed_that_is_held_does_not_move_the_start() {
         let part = |i: usize| [60, 160].partition_point(|from| *from <= i);
         let coasts = |i: usize| if i < 166 { 12_000.0 - 1500.0 * (i as f64 - 159.0) } else { f64::NAN };
         let n = 300;
