@@ -113,21 +113,6 @@ fn the_motor_starts_above_the_pulse_at_which_it_stands() {
     }
 }
 
-/// An efficient motor under an open arm: each sweep ends with the motor off, and the rotor takes a third of a second to half its speed. Four rows a
-/// sweep show it, and they count as much as the steps up.
-#[test]
-fn a_rotor_that_coasts_tells_its_air() {
-    let Some(data) = data("a rotor that coasts") else { return };
-    let file = "rig/dualcell-eco2814c/tidy/grp01__dualsky-eco2814c-v2_graupner-10x6_4s.csv";
-    let (log, _) = import(&data.join(file), &[]).unwrap_or_else(|e| panic!("{e}"));
-    let closed = close(&log, None, &[], &mut |_| {}).expect("a verdict");
-    let lag = closed.verdict.effects.iter().find(|e| e.id == "spinup_lag").expect("a rotor that follows late");
-    let air = lag.parameters.iter().find(|p| p.name == "tau_air").expect("a time of the air");
-    assert!((0.25..0.45).contains(&air.value) && air.ci95[0] > 0.1, "{air:?}");
-    let speed = &closed.verdict.channels["rpm"];
-    assert!(speed.before.heldout_rms > 4.0 * speed.after.heldout_rms, "{speed:?}");
-}
-
 /// The published lever-rig file has neither header nor commas: its columns are named on the command line, by position.
 #[test]
 fn a_file_without_a_header_is_mapped_by_position() {

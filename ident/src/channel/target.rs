@@ -66,8 +66,8 @@ impl Target {
         let floored = rows.iter().map(|i| noise.weight_variance(speed(i), FLOORED)).collect();
         let mut calm = vec![false; context.t.len()];
         context.calm.iter().for_each(|(a, b)| calm[*a..*b].fill(true));
-        // no curve of a driven motor holds for torque and current of a rotor whose motor is off and that still turns; its speed has its own law
-        let driven = matches!(relation, Relation::Torque | Relation::Current);
+        // no curve of a driven motor holds for speed, torque and current of a rotor whose motor is off and that still turns
+        let driven = matches!(relation, Relation::SpeedFromPulse | Relation::Torque | Relation::Current);
         let mut unsettled: Vec<bool> = rows.iter().map(|i| !calm[*i] || driven && context.runs_down(*i)).collect();
         let jumps = unsettled.iter().filter(|u| **u).count();
         if jumps < FEWEST_OF_A_KIND || unsettled.len() - jumps < FEWEST_OF_A_KIND.max(unsettled.len() / 4) {
