@@ -72,14 +72,14 @@ fn kept_turning(pulse: &[f64], rpm: &[f64], least: f64) -> Vec<bool> {
     out
 }
 
-/// Rows for which no command is known, in order: before the first that was logged and behind the last, by as much as none was logged for in between. A
-/// command that is logged now and then holds until the next is due; a recorder that goes on when its program has ended says nothing of what
-/// the motor was told.
+/// Rows for which no command is known any more, in order: behind the last that was logged, by as much as none was logged for in between. A command
+/// that is logged now and then holds until the next is due; a recorder that goes on when its program has ended says nothing of what the
+/// motor was told. Before the first command it was told nothing yet.
 pub(crate) fn uncommanded(pulse: &[f64]) -> Vec<usize> {
     let told: Vec<usize> = (0..pulse.len()).filter(|i| pulse[*i].is_finite()).collect();
-    let (Some(first), Some(last)) = (told.first(), told.last()) else { return Vec::new() };
+    let Some(last) = told.last() else { return Vec::new() };
     let holds = told.windows(2).map(|w| w[1] - w[0]).max().unwrap_or(1);
-    (0..pulse.len()).filter(|row| row + holds <= *first || *row >= last + holds).collect()
+    (last + holds..pulse.len()).collect()
 }
 
 #[cfg(test)]
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn commands_hold_until_the_next_is_due_and_no_longer() {
         let nan = f64::NAN;
-        assert_eq!(uncommanded(&[nan, 1000.0, 1100.0, nan, nan]), [0, 3, 4]);
+        assert_eq!(uncommanded(&[nan, 1000.0, 1100.0, nan, nan]), [3, 4]);
         assert_eq!(uncommanded(&[1000.0, nan, nan, 1100.0, nan, nan]), [] as [usize; 0]);
         assert_eq!(uncommanded(&[1000.0, nan, 1100.0, nan, nan, nan]), [4, 5]);
         assert_eq!(uncommanded(&[nan; 3]), [] as [usize; 0]);
