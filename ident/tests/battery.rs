@@ -22,11 +22,24 @@ struct Day {
     late: (f64, f64),
     /// Voltage that an ampere hour takes, V/Ah.
     slope: f64,
+    /// Charge of three full cells with the common table's open-circuit voltage, Ah; 0: they fall by `slope` instead.
+    full_ah: f64,
     /// Share by which the current at a speed grows each second, for a reason that no battery has.
     drifts: f64,
 }
 
-const DAY: Day = Day { seed: 1, rows: 3000, late: (0.0, 1.0), slope: 0.0, drifts: 0.0 };
+const DAY: Day = Day { seed: 1, rows: 3000, late: (0.0, 1.0), slope: 0.0, full_ah: 0.0, drifts: 0.0 };
+
+/// Open-circuit voltage of a lithium-polymer cell over its state of charge, V: the common table, twentieths from empty to full.
+fn cell_v(charge: f64) -> f64 {
+    const TABLE: [f64; 21] = [
+        3.27, 3.61, 3.69, 3.71, 3.73, 3.75, 3.77, 3.79, 3.80, 3.82, 3.84, 3.85, 3.87, 3.91, 3.95, 3.98, 4.02, 4.08, 4.11, 4.15,
+        4.20,
+    ];
+    let at = 20.0 * charge.clamp(0.0, 1.0);
+    let below = (at as usize).min(19);
+    TABLE[below] + (at - below as f64) * (TABLE[below + 1] - TABLE[below])
+}
 
 /// A log: the speed is held by the command, the current follows from the power.
 fn log(day: &Day) -> Log {
@@ -41,8 +54,9 @@ fn log(day: &Day) -> Log {
     let (mut late, mut charge) = (0.0, 0.0);
     let [mut rpm, mut current, mut voltage] = [const { Vec::new() }; 3];
     for i in 0..day.rows {
-        let open = 12.4 - day.slope * charge - day.late.0 * late;
-        let krpm = 6.0e-3 * (pulse[i] - 1000.0) * (1.0 - 0.5 * day.slope * charge / 12.4);
+        let rests = if day.full_ah > 0.0 { 3.0 * cell_v(1.0 - charge / day.full_ah) } else { 12.4 - day.slope * charge };
+        let open = rests - day.late.0 * late;
+        let krpm = 6.0e-3 * (pulse[i] - 1000.0) * (1.0 - 0.5 * (12.4 - rests) / 12.4);
         let amps = (0.3 + 0.15 * krpm * krpm * krpm) * (12.4 / open) * (1.0 + day.drifts * t[i]);
         let kept = (-STEP / day.late.1).exp();
         late = kept * late + (1.0 - kept) * amps;
@@ -134,4 +148,18 @@ fn a_short_run_tells_of_no_curve() {
     let closed = close(&log(&day), None, &[longer], &mut |_| {}).expect("a verdict");
     let voltage = closed.verdict.validation[0].channels["voltage_v"];
     assert!(voltage.after < 1.05 * voltage.before, "{:?} {voltage:?}", names(&closed));
+}
+
+/// From full to a third a cell's voltage falls fast at first and slowly later. Most of what a straight line leaves over goes with the curve.
+#[test]
+fn a_battery_that_starts_full_follows_its_curve() {
+    let day = Day { seed: 4, full_ah: 0.3, ..DAY };
+    let closed = close(&log(&day), None, &[], &mut |_| {}).expect("a verdict");
+    let battery = closed.verdict.effects.iter().find(|e| e.id == "battery_discharge");
+    let battery = battery.unwrap_or_else(|| panic!("{:?}", names(&closed)));
+    let value = |name: &str| battery.parameters.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
+    assert!(value("bend") < 0.0, "{battery:?}");
+    assert!((value("capacity") - day.full_ah).abs() < 0.2 * day.full_ah, "{battery:?}");
+    let voltage = &closed.verdict.channels["voltage_v"];
+    assert!(voltage.after.heldout_rms < 0.03, "{voltage:?}");
 }

@@ -46,6 +46,8 @@ pub(crate) struct Facts {
     pub(crate) balance: OnceLock<Option<Coast>>,
     /// Share of the voltage that goes with each Ah drawn, 1/Ah.
     pub(crate) discharge: OnceLock<f64>,
+    /// Cells in series of the pack that feeds it, and the state of charge at which the run begins.
+    pub(crate) pack: OnceLock<Option<[f64; 2]>>,
     /// Slope of the static speed curve on each row, rev/min per us.
     pub(crate) slope: OnceLock<Vec<f64>>,
     /// Where the thrust reads one and the same largest value.

@@ -1,16 +1,18 @@
 //! `battery_discharge`: the battery empties during the run.
 //!
-//! What it is: voltage_v falls with the charge drawn, along the cells' open-circuit curve (a parabola over the part of it that
-//! a run covers), and the speed at a given pulse follows the voltage; the current at a speed rises by what is known of brushless motors.
+//! What it is: voltage_v falls with the charge drawn, along the cells' open-circuit curve, and the speed at a given pulse follows the voltage; the
+//! current at a speed rises by what is known of brushless motors. The curve is that of lithium-polymer cells ([`super::cell`]), which the capacity
+//! alone places, or, for other cells, a straight line or a parabola over the part that a run covers.
 //! What can go wrong: whatever else drifts with time looks like it on speed and current, so these may not follow by more than the voltage falls.
 //! The capacity follows from the slope only as well as one knows the cell's curve: 15 % are added to its error.
-//! Units: V/Ah, V/Ah2, Ah.
+//! Units: V/Ah, V/Ah2, Ah; `follows` is a share of the share that the voltage falls by.
 //! Reference: open-circuit voltage of lithium-polymer cells falls by 0.65 V +- 15 % per unit of charge between full and the
 //! knee: 4.20 V full, 3.87 V at 50 % (Chen & Rincon-Mora 2006, Fig. 8, and common discharge tables).
 
 use crate::channel::{Context, Relation};
-use crate::effects::design::TargetDesign;
-use crate::effects::supply::supply_voltage::CURRENT_BY_SPEED;
+use crate::effects::design::{Label, TargetDesign};
+use crate::effects::supply::cell::Pack;
+use crate::effects::supply::supply_voltage::{CURRENT_BY_SPEED, OF_SPEED};
 use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage, present, speeds};
 use crate::numeric::solve::Normal;
 
@@ -33,7 +35,7 @@ impl Effect for BatteryDischarge {
     fn about(&self) -> About {
         About {
             title: "Battery discharges during the run",
-            equation: "voltage_v = V0 - slope q - bend q^2 (curved) or V0 - slope q (straight), rpm(pulse) *= 1 - speed_loss q, current_a *= 1 + 0.875 speed_loss q, q = charge drawn",
+            equation: "voltage_v = V0 - U(0) + U(q / capacity) (lithium, U: open-circuit voltage) or V0 - slope q - bend q^2 (curved) or V0 - slope q (straight), rpm(pulse) *= 1 - loss, current_a *= 1 + 0.875 loss, loss = follows (1 - U(q / capacity) / U(0)) or speed_loss q, q = charge drawn",
             source: "open-circuit voltage of lithium-polymer cells, Chen & Rincon-Mora 2006",
             depends_on: &["charge"],
             signature: "voltage and speed at the same pulse fall together, fastest at high current, and never come back",
@@ -71,7 +73,7 @@ impl Effect for BatteryDischarge {
         let mut channels = vec!["voltage_v"];
         channels.extend(present(context, &["current_a"]));
         channels.extend(speeds(context));
-        let forms: &[&str] = if context.against_model { &[OTHER_SUPPLY] } else { &[STRAIGHT, CURVED] };
+        let forms: &[&str] = if context.against_model { &[OTHER_SUPPLY] } else { &[STRAIGHT, CURVED, LITHIUM] };
         // where something else drifts on speed or current, the voltage alone still tells of the battery; not so in a table of levels, where charge
         // and current rise together, and not against a model, where another supply moves the speed
         let alone = channels.len() > 1 && !context.is_table() && !context.against_model;
@@ -80,10 +82,16 @@ impl Effect for BatteryDischarge {
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
-        if !instance.channels.iter().any(|c| c.starts_with("rpm") || c == "current_a") {
+        let total = charge(context).last().copied().unwrap_or(0.0).max(1e-6);
+        let beyond_voltage = instance.channels.iter().any(|c| c.starts_with("rpm") || c == "current_a");
+        if instance.form == LITHIUM {
+            let least = LEAST_LOSS / (fall(context) * total).max(LEAST_LOSS);
+            let follows = Shape { name: "follows", unit: "1", range: (-least, 1.5), starts: vec![0.1, 0.5, 1.0] };
+            return std::iter::once(capacity(context, total)).chain(beyond_voltage.then_some(follows)).collect();
+        }
+        if !beyond_voltage {
             return Vec::new();
         }
-        let total = charge(context).last().copied().unwrap_or(0.0).max(1e-6);
         // a motor at a held duty turns no slower than its voltage falls
         let most = fall(context).max(LEAST_LOSS / total);
         let starts = [0.02, 0.1, 0.3, 0.7].map(|k| k * most).to_vec();
@@ -95,10 +103,20 @@ impl Effect for BatteryDischarge {
         vec![loss, level]
     }
 
+    /// A motor at a held duty follows its supply as it does on any other.
+    fn prior(&self, _: &Context, instance: &Instance, shape: &[f64]) -> f64 {
+        match shape {
+            [_, follows, ..] if instance.form == LITHIUM => -0.5 * ((follows - OF_SPEED.0) / OF_SPEED.1).powi(2),
+            _ => 0.0,
+        }
+    }
+
     fn amplitudes(&self, instance: &Instance) -> Vec<Amplitude> {
         let mut out = vec![Amplitude { name: "slope", unit: "V/Ah" }, Amplitude { name: "bend", unit: "V/Ah2" }];
-        if instance.form == STRAIGHT {
-            out.truncate(1);
+        match instance.form.as_str() {
+            STRAIGHT => out.truncate(1),
+            LITHIUM => out.clear(),
+            _ => {}
         }
         if instance.form == OTHER_SUPPLY {
             out.push(Amplitude { name: "level", unit: "V" });
@@ -111,6 +129,9 @@ impl Effect for BatteryDischarge {
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let charge = charge(context);
         let other = instance.form == OTHER_SUPPLY;
+        if instance.form == LITHIUM {
+            return empties(context, &charge, shape, design);
+        }
         let scale = |design: &mut TargetDesign, of: &dyn Fn(f64) -> f64| {
             design.map_columns(|column| column.iter().zip(&charge).map(|(v, q)| v * of(*q)).collect());
         };
@@ -141,7 +162,10 @@ impl Effect for BatteryDischarge {
         }
     }
 
-    fn report(&self, context: &Context, _: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+    fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        if instance.form == LITHIUM {
+            return with_mean_slope(context, fitted);
+        }
         let value = |name: &str| fitted.iter().find(|e| e.name == name).map_or((0.0, 0.0), |e| (e.value, e.se));
         let drawn = charge(context).last().copied().unwrap_or(0.0);
         let ((slope, se), (bend, _)) = (value("slope"), value("bend"));
@@ -166,7 +190,7 @@ impl Effect for BatteryDischarge {
         let capacity = reported.iter().find(|e| e.name == "capacity").map_or(f64::INFINITY, |e| e.value);
         // more than that is no open-circuit voltage: it would be far off on a longer run
         let bends = (value("bend") * capacity).abs() < MOST_BENT * (value("slope") + value("bend") * drawn).abs();
-        let is_battery = instance.form == OTHER_SUPPLY || bends;
+        let is_battery = [OTHER_SUPPLY, LITHIUM].contains(&instance.form.as_str()) || bends;
         (instance.form != OTHER_SUPPLY || shows) && is_battery && capacity < LARGEST_BATTERY
     }
 }
@@ -178,6 +202,8 @@ const OTHER_SUPPLY: &str = "in the place of another supply";
 const STRAIGHT: &str = "straight";
 /// Form in which it falls along a parabola.
 const CURVED: &str = "";
+/// Form in which it falls along the curve of lithium-polymer cells.
+const LITHIUM: &str = "lithium";
 
 /// Most of the mean slope by which the slope of a cell's curve may have changed after half its capacity: from 0.9 V to 0.4 V per unit of charge
 /// around a mean of 0.65 V (4.20 V full, 3.87 V half empty, 3.7 V at the knee).
@@ -185,6 +211,45 @@ const MOST_BENT: f64 = 0.8;
 
 /// The largest battery that a motor rig is fed from, Ah.
 const LARGEST_BATTERY: f64 = 40.0;
+
+/// Capacities to look for, about that of the straight line.
+fn capacity(context: &Context, drawn: f64) -> Shape {
+    let pack = Pack::of(context).unwrap_or(Pack { cells: 1.0, begins: 1.0 });
+    let least = drawn / pack.begins.max(0.05);
+    let usual = CELL_SLOPE.0 / (fall(context) * CELL_V).max(1e-9);
+    let starts = [0.6, 1.0, 1.7].map(|k| (k * usual).clamp(1.05 * least, (0.9 * LARGEST_BATTERY).max(2.0 * least))).to_vec();
+    Shape { name: "capacity", unit: "Ah", range: (least, LARGEST_BATTERY.max(3.0 * least)), starts }
+}
+
+/// What cells that empty do to a channel. A run without a voltage is taken to have that of the model, or full cells.
+fn empties(context: &Context, charge: &[f64], shape: &[f64], design: &mut TargetDesign) {
+    let [capacity, ref more @ ..] = *shape else { return };
+    let told = || design.told.iter().find(|t| t.label == Label::Base(0)).map(|t| Pack::with(t.value));
+    if design.relation == Relation::Voltage {
+        let pack = Pack::of(context).or_else(told).unwrap_or(Pack { cells: 1.0, begins: 1.0 });
+        design.fixed.resize(charge.len(), 0.0);
+        design.fixed.iter_mut().zip(charge).for_each(|(f, q)| *f -= pack.lost(*q, capacity));
+        return;
+    }
+    let pack = Pack::of(context).unwrap_or(Pack { cells: 1.0, begins: 1.0 });
+    let by = more.first().copied().unwrap_or(0.0) * if design.relation == Relation::Current { -CURRENT_BY_SPEED } else { 1.0 };
+    let factor: Vec<f64> = charge.iter().map(|q| 1.0 - by * pack.share_lost(*q, capacity)).collect();
+    design.scale(&factor);
+}
+
+/// The estimates of a pack, with the slope at which its voltage fell over the run as a whole. How well one knows the cell's curve is in the error.
+fn with_mean_slope(context: &Context, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+    let drawn = charge(context).last().copied().unwrap_or(0.0);
+    let capacity = fitted.iter_mut().find(|e| e.name == "capacity");
+    let (Some(capacity), Some(pack)) = (capacity.filter(|c| c.value > 0.0 && drawn > 0.0), Pack::of(context)) else {
+        return fitted;
+    };
+    let slope = pack.lost(drawn, capacity.value) / drawn;
+    let slope = Estimate { name: "slope".into(), unit: "V/Ah".into(), value: slope, se: slope * capacity.se / capacity.value };
+    capacity.se = capacity.se.hypot(CELL_SLOPE.1 * capacity.value);
+    fitted.push(slope);
+    fitted
+}
 
 /// Share of the voltage that goes with each Ah drawn, 1/Ah, beside what the current takes of it at once; 0 without a voltage.
 fn fall(context: &Context) -> f64 {

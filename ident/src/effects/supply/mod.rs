@@ -7,6 +7,7 @@
 
 pub(super) mod battery_discharge;
 pub(super) mod battery_relaxation;
+pub(crate) mod cell;
 pub(super) mod current_limit;
 pub(crate) mod supply_sag;
 pub(crate) mod supply_voltage;
