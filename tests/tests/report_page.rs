@@ -130,7 +130,7 @@ fn what_is_left_has_its_figure_or_says_where_it_is() {
         drawn += usize::from(left.contains(&format!("<figure id=\"left-{anchor}\"")));
         above += usize::from(page.contains(&format!("<figure id=\"most-{anchor}\"")));
     }
-    let said = left.matches(": drawn at the head of this page.").count();
+    let said = left.matches("Drawn at the head of this page: ").count();
     assert!(all.len() > 2 && above > 0 && drawn + said == all.len(), "{drawn} drawn, {said} said of {}", all.len());
 }
 

@@ -89,7 +89,8 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
         held: runs.iter().all(|r| r.closed.verdict.held),
         at_rest: runs.iter().all(|r| r.closed.verdict.at_rest),
         sensor_share: Some(models[1].sensor_share).filter(|share| *share > 0.0),
-        guessed_floors: runs.iter().filter_map(|r| r.closed.verdict.guessed_floors).max(),
+        // of all of them or of none: a run of single rows beside others says so on its own page
+        guessed_floors: runs.iter().map(|r| r.closed.verdict.guessed_floors).min().flatten(),
         validation: Vec::new(),
         runs: runs.iter().enumerate().map(|(k, run)| of_run(run, k, compared, &silent)).collect(),
     }

@@ -392,8 +392,8 @@ fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
         .filter(shown)
         .map(|p| {
             let [v, interval, unit] = value(p);
-            let note = if sized(p).is_some() { "" } else { "not well known" };
-            vec![(words.parameter)(&e.id, &p.name), v, interval, unit, note.to_owned()]
+            let note = if sized(p).is_some() { "" } else { " (not well known)" };
+            vec![(words.parameter)(&e.id, &p.name) + note, v, interval, unit]
         })
         .collect();
     let raw: Vec<Vec<String>> = e
@@ -403,10 +403,7 @@ fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
         .map(|p| vec![p.name.clone(), p.value.to_string(), p.ci95[0].to_string(), p.ci95[1].to_string(), p.unit.clone()])
         .collect();
     if !rows.is_empty() {
-        let notes = rows.iter().any(|r| !r[4].is_empty());
-        let width = if notes { 5 } else { 4 };
-        let rows: Vec<Vec<String>> = rows.into_iter().map(|r| r[..width].to_vec()).collect();
-        let head = &["parameter", "value", "95 % interval", "unit", ""][..width];
+        let head = &["parameter", "value", "95 % interval", "unit"];
         sheet.data(&format!("{}-parameters", e.id), head, &rows, Some((&["parameter", "value", "low", "high", "unit"], &raw)));
     }
 }

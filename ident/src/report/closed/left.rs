@@ -62,7 +62,7 @@ pub(super) fn left(sheet: &mut Sheet, page: &Page<'_>) {
     // what the convincing figure shows is not drawn again
     let shown = |f: &Figure| page.hero.iter().any(|h| h.title == f.title);
     let (above, here): (Vec<&Figure>, Vec<&Figure>) = page.left.iter().partition(|f| shown(f));
-    above.iter().for_each(|f| sheet.say(&format!("{}: drawn at the head of this page.", f.title)));
+    above.iter().for_each(|f| sheet.say(&format!("Drawn at the head of this page: {}.", f.title)));
     sheet.figures(here.into_iter().cloned().collect());
 }
 

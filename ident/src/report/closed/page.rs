@@ -80,7 +80,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         }
         [] => {}
     }
-    page.origin.doubts.iter().for_each(|doubt| sheet.warn(&format!("{doubt}.")));
+    page.origin.doubts.iter().for_each(|doubt| sheet.warn(&format!("{doubt}{}", if doubt.ends_with('?') { "" } else { "." })));
     cautions::cautions(v).iter().for_each(|caution| sheet.warn(caution));
     for l in &v.left_out {
         sheet.warn(&format!("Left out: {l}."));

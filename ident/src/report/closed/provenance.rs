@@ -137,7 +137,9 @@ impl Origin {
             .collect();
         let seconds = log.t.first().zip(log.t.last()).map(|(a, b)| b - a).filter(|_| !log.time_is_row());
         let lacks = Gaps::of(log).map(|gaps| format!("{}: {gaps}", log.name)).into_iter().collect();
-        let doubts = log.in_doubt().into_iter().map(|doubt| format!("{}: {doubt}", log.name)).collect();
+        let timeless =
+            log.time_is_row().then(|| "no time column: rows are counted, and no effect of time is looked for".to_owned());
+        let doubts = timeless.into_iter().chain(log.in_doubt()).map(|doubt| format!("{}: {doubt}", log.name)).collect();
         Self { log: FittedTo::of(log), seconds, states, of_a_rig: true, lacks, doubts, ..Self::default() }
     }
 
