@@ -18,7 +18,7 @@ use ident::identify::{Identified, identify, identify_in};
 use ident::log::Log;
 use ident::numeric::digits::number;
 use ident::plateau::so_many;
-use ident::report::{Sheet, WIDEST, headline, set_aside, when, wrapped};
+use ident::report::{Sheet, WIDEST, headline, when, wrapped};
 use ident::verdict::words::{bracketed, channel, to_error};
 use std::path::PathBuf;
 
@@ -138,7 +138,6 @@ fn text(log: &Log, found: &Identified) -> String {
             q.r2
         );
     }
-    out += &set_aside(&found.set_aside, "; the page (--report) lists them");
     if !found.curves.is_empty() {
         out += "\ncurves through the plateaus as read (95 % intervals)\n";
     }

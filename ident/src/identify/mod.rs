@@ -14,7 +14,6 @@ use crate::identify::curves::{Estimate, Fitted, Law, Spin, Zero, declared, motor
 use crate::log::Log;
 use crate::model::{FittedTo, Model};
 use crate::plateau::{Plateau, detect};
-use crate::signal::bad::{self, SetAside};
 
 /// Why the loop cannot be closed on a log.
 #[derive(Debug, thiserror::Error)]
@@ -108,8 +107,6 @@ pub struct Identified {
     pub levels: Vec<Level>,
     /// Thrust over throttle and voltage, or why it is not known.
     pub surface: Result<Surface, String>,
-    /// Bad samples that the fits over all rows leave out.
-    pub set_aside: Vec<SetAside>,
 }
 
 /// Identifies a log.
@@ -127,17 +124,10 @@ pub fn identify(log: &Log) -> Result<Identified, CloseError> {
 pub fn identify_in(log: &Log, air_kg_m3: Option<f64>) -> Result<Identified, CloseError> {
     let context = Context::bare(log, None);
     // the fits over all rows and the plateaus need nothing of each other: one core each
-    let (fitted, set_aside, plateaus) = std::thread::scope(|scope| {
+    let (fitted, plateaus) = std::thread::scope(|scope| {
         let found = scope.spawn(|| detect(log, &context.rpm));
-        let aside = bad::found(log);
-        // a level's mean bears one bad row, a fit over all rows does not
-        let relations = if aside.is_empty() {
-            all_rows(log, &context)
-        } else {
-            let clean = bad::without(log, &aside);
-            all_rows(&clean, &Context::bare(&clean, None))
-        };
-        (relations, aside, found.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        let relations = all_rows(log, &context);
+        (relations, found.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     });
     let (model, quality) = fitted.ok_or_else(|| CloseError::NoRelation { run: log.name.clone() })?;
     let speeds = speeds(log, &plateaus, &context.consensus.channels);
@@ -181,7 +171,6 @@ pub fn identify_in(log: &Log, air_kg_m3: Option<f64>) -> Result<Identified, Clos
         disc,
         levels,
         surface,
-        set_aside,
     })
 }
 
@@ -256,40 +245,4 @@ fn all_rows(log: &Log, context: &Context) -> Option<(Model, Vec<Quality>)> {
         });
     }
     related.then(|| (Model { runs: vec![FittedTo::of(log)], ..Model::of(context, log, polynomials) }, quality))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Twenty levels up and down again, 15 rows each; with one reading of thrust that nothing else bears out, or none.
-    fn run(bad: Option<(usize, f64)>) -> Identified {
-        let mut text = String::from("# quadrig-log 1\nt_s,pulse_us,rpm,thrust_n\n");
-        for row in 0..600_usize {
-            let level = (row / 15).min(39 - row / 15);
-            let rpm = if level == 0 { 0.0 } else { 1500.0 + 400.0 * level as f64 + (row * 7 % 5) as f64 };
-            let thrust = 1.7e-7 * rpm * rpm + 1e-3 * (row * 11 % 7) as f64;
-            let thrust = bad.filter(|(at, _)| *at == row).map_or(thrust, |(_, reads)| reads);
-            text += &format!("{:.2},{},{rpm},{thrust:.5}\n", 0.1 * row as f64, 1000 + 50 * level);
-        }
-        identify(&Log::parse("run.csv", text.as_bytes()).expect("a log")).expect("fits")
-    }
-
-    /// The model is fitted to all rows: one bad sample must not bend it, and is told.
-    #[test]
-    fn one_bad_sample_does_not_bend_the_model() {
-        let polynomial =
-            |found: &Identified| found.model.polynomials.iter().find(|p| p.channel == "thrust_n").expect("thrust").clone();
-        let right = polynomial(&run(None));
-        for (row, reads) in [(150, 80.0), (308, -30.0), (595, 1e4)] {
-            let found = run(Some((row, reads)));
-            let told: Vec<(usize, &str)> = found.set_aside.iter().map(|a| (a.row, a.channel.as_str())).collect();
-            assert_eq!(told, [(row, "thrust_n")]);
-            let bent = polynomial(&found);
-            for ((c, was), se) in bent.coefficients.iter().zip(&right.coefficients).zip(&right.errors) {
-                assert!((c - was).abs() < *se, "{row}: {:?}, without it {:?}", bent.coefficients, right.coefficients);
-            }
-        }
-        assert_eq!(run(None).set_aside, []);
-    }
 }

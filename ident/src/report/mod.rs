@@ -29,7 +29,7 @@ mod svg;
 pub use beam::{beam, figures as beam_figures, warning as beam_warning};
 #[cfg(test)]
 pub(crate) use closed::bare_entry;
-pub use closed::{Hidden, Origin, Vocabulary, WIDEST, sentence, set_aside, terminal, wrapped};
+pub use closed::{Hidden, Origin, Vocabulary, WIDEST, sentence, terminal, wrapped};
 pub use figure::{Figure, Layer, Mark};
 pub use history::{page as history_page, terminal as history_terminal};
 pub use isolability::{isolability, isolability_csv, isolability_svg};

@@ -6,7 +6,6 @@
 //! Units: on the axes.
 //! Reference: Beharie 2013, Figures 5.22 to 5.25, 5.56 to 5.79.
 
-use super::closed::took_no_part;
 use super::designer::{designer, paired};
 use super::figure::{Figure, Layer, Mark};
 use super::sheet::Sheet;
@@ -56,7 +55,6 @@ pub fn run(log: &Log, found: &Identified, other: Option<(&Log, &Identified)>) ->
         sheet.section("Coefficients");
         coefficients(&mut sheet, found);
     }
-    took_no_part(&mut sheet, Vec::new(), &found.set_aside, "in the table's file");
     let told = board::told(log);
     if !told.is_empty() {
         sheet.section("What the board told");

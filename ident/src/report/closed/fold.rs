@@ -82,14 +82,8 @@ pub(super) fn sureness(sheet: &mut Sheet, page: &Page<'_>) {
 
 /// Samples and channels that took no part.
 pub(crate) fn aside(sheet: &mut Sheet, verdict: &Verdict) {
-    let left_out = verdict.left_out.iter().map(ToString::to_string).collect();
-    took_no_part(sheet, left_out, &verdict.set_aside, "listed in verdict.json");
-}
-
-/// Levels that were left out and samples that were set aside; of many some, and where all of them stand.
-pub(crate) fn took_no_part(sheet: &mut Sheet, left_out: Vec<String>, aside: &[SetAside], listed: &str) {
-    let mut lines: Vec<Vec<String>> =
-        left_out.into_iter().chain(aside.iter().map(ToString::to_string)).map(|l| vec![l]).collect();
+    let mut lines: Vec<Vec<String>> = verdict.left_out.iter().map(|l| vec![l.to_string()]).collect();
+    lines.extend(verdict.set_aside.iter().map(|a| vec![a.to_string()]));
     if lines.is_empty() {
         return;
     }
@@ -98,11 +92,11 @@ pub(crate) fn took_no_part(sheet: &mut Sheet, left_out: Vec<String>, aside: &[Se
         let figures = [a.t_s, a.until_s, a.value, a.expected].map(|v| v.to_string());
         std::iter::once(a.channel.clone()).chain(counts).chain(figures).collect()
     };
-    let raw: Vec<Vec<String>> = aside.iter().map(raw).collect();
+    let raw: Vec<Vec<String>> = verdict.set_aside.iter().map(raw).collect();
     let all = lines.len();
     lines.truncate(MOST);
     if all > MOST {
-        lines.push(vec![format!("and {} more, {listed}", all - MOST)]);
+        lines.push(vec![format!("and {} more, listed in verdict.json", all - MOST)]);
     }
     sheet.fold("What took no part", |sheet| {
         let raw_head = ["channel", "row", "rows", "t_s", "until_s", "value", "expected"];

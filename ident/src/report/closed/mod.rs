@@ -26,7 +26,7 @@ pub(crate) use evidence::{
     ALONE, SEEN, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, scatter, shown_most, slug, thinned,
     two_ways,
 };
-pub(crate) use fold::{aside, candidates, took_no_part};
+pub(crate) use fold::{aside, candidates};
 pub(crate) use look::{LOOK, SCRIPT};
 pub(crate) use lost::struck;
 pub(crate) use page::{Page, Reading, begin};
@@ -34,7 +34,7 @@ pub use provenance::{Hidden, Origin};
 pub(crate) use sentence::loudest;
 pub use sentence::sentence;
 pub(crate) use state::bars;
-pub use terminal::{WIDEST, set_aside, terminal, wrapped};
+pub use terminal::{WIDEST, terminal, wrapped};
 pub use vocabulary::Vocabulary;
 pub(crate) use vocabulary::{ALL_ROWS, bare};
 #[cfg(test)]

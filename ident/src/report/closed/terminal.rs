@@ -54,7 +54,7 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
     }
     out += &set_apart(verdict, words, &readings);
     out += &left(verdict);
-    out += &set_aside(&verdict.set_aside, ", listed in verdict.json and in the report");
+    out += &set_aside(verdict);
     let all: Vec<String> = verdict.alternatives.iter().filter_map(|a| alternative(verdict, a)).collect();
     if !all.is_empty() {
         out += &format!("\n{}\n", wrapped(&format!("alternatives: {}", all.join("; ")), 2));
@@ -203,11 +203,10 @@ fn left(verdict: &Verdict) -> String {
     out
 }
 
-/// The samples that took no part, the longest stretches first; behind those that are not shown, where they are `listed`.
-#[must_use]
-pub fn set_aside(all: &[SetAside], listed: &str) -> String {
+/// The samples that took no part.
+fn set_aside(verdict: &Verdict) -> String {
     // the longest first: they say most of the log
-    let mut all: Vec<&SetAside> = all.iter().collect();
+    let mut all: Vec<&SetAside> = verdict.set_aside.iter().collect();
     all.sort_by_key(|aside| std::cmp::Reverse(aside.rows));
     if all.is_empty() {
         return String::new();
@@ -219,7 +218,7 @@ pub fn set_aside(all: &[SetAside], listed: &str) -> String {
             1 => "one more stretch".to_owned(),
             n => format!("{n} more stretches"),
         };
-        out += &format!("  and {more} like these{listed}\n");
+        out += &format!("  and {more} like these, listed in verdict.json and in the report\n");
     }
     out
 }
