@@ -98,7 +98,7 @@ pub(super) fn own_entries(context: &Context, own: &RunLevel, worths: &[Worth]) -
         };
         let times = 1.0 / (1.0 - or_nothing(reduction)).max(1e-6);
         let entry = EffectEntry {
-            kin: Kin::Own,
+            kin: p.effect.kin(context, &p.instance, &reported),
             id: p.effect.id().to_owned(),
             scope,
             run: Some(context.name.clone()),

@@ -35,7 +35,7 @@ impl Effect for BatteryDischarge {
     fn about(&self) -> About {
         About {
             title: "Battery discharges during the run",
-            equation: "voltage_v = V0 - U(0) + U(q / capacity) (lithium, U: open-circuit voltage) or V0 - slope q - bend q^2 (curved) or V0 - slope q (straight), rpm(pulse) *= 1 - loss, current_a *= 1 + 0.875 loss, loss = follows (1 - U(q / capacity) / U(0)) or speed_loss q, q = charge drawn",
+            equation: "voltage_v = V0 - slope q - bend q^2, rpm(pulse) *= 1 - speed_loss q, current_a *= 1 + 0.875 speed_loss q; lithium cells: voltage_v = V0 - U(0) + U(q / capacity), U the open-circuit voltage, rpm(pulse) *= 1 - follows (1 - U(q / capacity) / U(0)), current_a the other way by 0.875 of it; q the charge drawn",
             source: "open-circuit voltage of lithium-polymer cells, Chen & Rincon-Mora 2006",
             depends_on: &["charge"],
             signature: "voltage and speed at the same pulse fall together, fastest at high current, and never come back",

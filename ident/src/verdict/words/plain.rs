@@ -114,8 +114,14 @@ fn formula(equation: &str) -> (&str, Option<String>) {
 }
 
 /// What stands between two ways in which an effect may act, the second of which is a form of its own.
-const EITHER: [&str; 5] =
-    ["; or, as play: ", "; smooth: ", "; form whole_blade: ", "; a rotor between winding and air, ", ", or "];
+const EITHER: [&str; 6] = [
+    "; or, as play: ",
+    "; smooth: ",
+    "; form whole_blade: ",
+    "; a rotor between winding and air, ",
+    "; lithium cells: ",
+    ", or ",
+];
 /// What stands before what an effect does besides: in a form of its own, and against a declared model.
 const BESIDES: [&str; 2] = ["; at the same power also ", "; against a declared model also "];
 
