@@ -210,7 +210,34 @@ pub(super) fn unnamed(left: &Unexplained) -> EffectEntry {
 
 #[cfg(test)]
 mod tests {
-    use super::probabilities;
+    use super::*;
+    use crate::effects::{Instance, by_id};
+    use crate::log::{Column, Log};
+
+    /// A lag that only one of the runs shows is what every rig has all the same; a zero that slipped is that run's own.
+    #[test]
+    fn what_every_rig_has_is_told_apart_on_one_run_too() {
+        let column = |name: &str, by: f64| Column { name: name.into(), values: (0..40).map(|i| by * f64::from(i)).collect() };
+        let columns = vec![column("pulse_us", 10.0), column("rpm", 100.0), column("thrust_n", 0.1)];
+        let log = Log { t: (0..40).map(|i| 0.1 * f64::from(i)).collect(), columns, ..Log::default() };
+        let context = Context::new(&log, Some(1000.0));
+        let added = |id: &str, channel: &str, shape: &[f64]| AddedEffect {
+            placed: Placed {
+                effect: by_id(id).expect("an effect"),
+                instance: Instance::new(&[channel], ""),
+                shape: shape.to_vec(),
+            },
+            amplitudes: Vec::new(),
+            estimates: Vec::new(),
+            mean: Vec::new(),
+            reach: Vec::new(),
+            shape_errors: Vec::new(),
+        };
+        let effects = vec![added("spinup_lag", "rpm", &[0.1]), added("tare_shift", "thrust_n", &[2.0])];
+        let worth = || Worth { gain: 30.0, reduction: vec![("rpm", 0.5)], rivals: Vec::new() };
+        let told = own_entries(&context, &RunLevel { effects, ..RunLevel::default() }, &[worth(), worth()]);
+        assert_eq!(told.iter().map(|(e, _)| e.kin).collect::<Vec<_>>(), [Kin::OfEvery, Kin::Own]);
+    }
 
     #[test]
     fn what_could_stand_in_its_place_takes_from_a_name() {

@@ -480,6 +480,12 @@ mod tests {
 
     /// Words are no surer than the intervals beside them.
     #[test]
+    fn a_title_is_told_in_short() {
+        assert_eq!(in_short("slow meter: the channel is filtered".into()), "slow meter");
+        assert_eq!(in_short("battery discharges during the run".into()), "battery discharges during the run");
+    }
+
+    #[test]
     fn a_size_that_may_be_zero_is_told_beside_how_sure_a_name_is() {
         use crate::verdict::words::sureness;
         let size = |name: &str, ci95: [f64; 2]| Parameter { name: name.into(), value: 0.1, unit: "N".into(), ci95 };
