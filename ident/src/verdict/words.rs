@@ -105,6 +105,7 @@ pub fn parameter_of(id: &str, name: &str) -> String {
         ("stall", "current_rise") => "change of current".to_owned(),
         ("stall", "current_rise_loss") => "change of current, beside that".to_owned(),
         ("stall", "speed_loss") => "change of speed".to_owned(),
+        ("battery_discharge", "follows") => "share of the voltage's fall that the speed follows".to_owned(),
         _ => parameter(name),
     }
 }
