@@ -44,8 +44,8 @@ pub(crate) struct Facts {
     pub(crate) driven: OnceLock<Option<Vec<f64>>>,
     /// When a rotor that slows down draws nothing; nothing where the run does not say.
     pub(crate) balance: OnceLock<Option<Coast>>,
-    /// Share of the voltage that goes with each Ah drawn, 1/Ah.
-    pub(crate) discharge: OnceLock<f64>,
+    /// The supply as a straight line: voltage without a current, V, what an ampere adds to it, ohm, and what each Ah drawn adds, V/Ah.
+    pub(crate) supply: OnceLock<Option<[f64; 3]>>,
     /// Cells in series of the pack that feeds it, and the state of charge at which the run begins.
     pub(crate) pack: OnceLock<Option<[f64; 2]>>,
     /// Slope of the static speed curve on each row, rev/min per us.

@@ -214,7 +214,7 @@ const LARGEST_BATTERY: f64 = 40.0;
 
 /// Capacities to look for, about that of the straight line.
 fn capacity(context: &Context, drawn: f64) -> Shape {
-    let pack = Pack::of(context).unwrap_or(Pack { cells: 1.0, begins: 1.0 });
+    let pack = Pack::of(context).unwrap_or(Pack::FULL);
     let least = drawn / pack.begins.max(0.05);
     let usual = CELL_SLOPE.0 / (fall(context) * CELL_V).max(1e-9);
     let starts = [0.6, 1.0, 1.7].map(|k| (k * usual).clamp(1.05 * least, (0.9 * LARGEST_BATTERY).max(2.0 * least))).to_vec();
@@ -226,12 +226,12 @@ fn empties(context: &Context, charge: &[f64], shape: &[f64], design: &mut Target
     let [capacity, ref more @ ..] = *shape else { return };
     let told = || design.told.iter().find(|t| t.label == Label::Base(0)).map(|t| Pack::with(t.value));
     if design.relation == Relation::Voltage {
-        let pack = Pack::of(context).or_else(told).unwrap_or(Pack { cells: 1.0, begins: 1.0 });
+        let pack = Pack::of(context).or_else(told).unwrap_or(Pack::FULL);
         design.fixed.resize(charge.len(), 0.0);
         design.fixed.iter_mut().zip(charge).for_each(|(f, q)| *f -= pack.lost(*q, capacity));
         return;
     }
-    let pack = Pack::of(context).unwrap_or(Pack { cells: 1.0, begins: 1.0 });
+    let pack = Pack::of(context).unwrap_or(Pack::FULL);
     let by = more.first().copied().unwrap_or(0.0) * if design.relation == Relation::Current { -CURRENT_BY_SPEED } else { 1.0 };
     let factor: Vec<f64> = charge.iter().map(|q| 1.0 - by * pack.share_lost(*q, capacity)).collect();
     design.scale(&factor);
@@ -251,15 +251,21 @@ fn with_mean_slope(context: &Context, mut fitted: Vec<Estimate>) -> Vec<Estimate
     fitted
 }
 
+/// The supply of a run as a straight line over current and charge: voltage, V, with each ampere, ohm, with each Ah, V/Ah; nothing without a voltage.
+pub(super) fn straight(context: &Context) -> Option<[f64; 3]> {
+    *context.facts.supply.get_or_init(|| {
+        let (volts, (current, _)) = (context.voltage.as_ref()?, context.draw()?);
+        let columns = [vec![1.0; volts.len()], current.into_owned(), charge(context)];
+        let solution = Normal::of_columns(&columns, volts, &vec![1.0; volts.len()]).solve()?;
+        Some([0, 1, 2].map(|k| solution.coefficients[k]))
+    })
+}
+
 /// Share of the voltage that goes with each Ah drawn, 1/Ah, beside what the current takes of it at once; 0 without a voltage.
 fn fall(context: &Context) -> f64 {
-    *context.facts.discharge.get_or_init(|| {
-        let (Some(volts), Some((current, _))) = (&context.voltage, context.draw()) else { return 0.0 };
-        let columns = [vec![1.0; volts.len()], current.into_owned(), charge(context)];
-        let solution = Normal::of_columns(&columns, volts, &vec![1.0; volts.len()]).solve();
-        let mean = volts.iter().sum::<f64>() / volts.len() as f64;
-        solution.map_or(0.0, |s| (-s.coefficients[2] / mean).max(0.0))
-    })
+    let (Some([_, _, slope]), Some(volts)) = (straight(context), &context.voltage) else { return 0.0 };
+    let mean = volts.iter().sum::<f64>() / volts.len() as f64;
+    (-slope / mean).max(0.0)
 }
 
 /// Charge drawn since the first row, Ah.

@@ -8,9 +8,8 @@
 //! Reference: discharge tables of lithium-polymer packs; Chen & Rincon-Mora 2006, IEEE Trans. Energy Conversion 21:504, Fig. 8, has the same course.
 
 use crate::channel::Context;
-use crate::effects::supply::battery_discharge::charge;
+use crate::effects::supply::battery_discharge::straight;
 use crate::numeric::order::median;
-use crate::numeric::solve::Normal;
 
 /// Voltage at twentieths of the charge, from empty to full, V: the mean of each point of the table and its neighbours (1/4, 1/2, 1/4),
 /// taken three times.
@@ -48,6 +47,9 @@ pub(crate) struct Pack {
 }
 
 impl Pack {
+    /// One full cell: where nothing is known of the voltage.
+    pub(super) const FULL: Self = Self { cells: 1.0, begins: 1.0 };
+
     /// One with an open-circuit voltage.
     pub(super) fn with(open_v: f64) -> Self {
         let cells = (open_v / FULLEST_V).ceil().max(1.0);
@@ -58,9 +60,7 @@ impl Pack {
     pub(super) fn of(context: &Context) -> Option<Self> {
         let told = context.facts.pack.get_or_init(|| {
             let (measured, (current, _)) = (context.voltage.as_ref()?, context.draw()?);
-            let columns = [vec![1.0; measured.len()], current.to_vec(), charge(context)];
-            let fitted = Normal::of_columns(&columns, measured, &vec![1.0; measured.len()]).solve();
-            let ohm = fitted.map_or(0.0, |s| (-s.coefficients[1]).max(0.0));
+            let ohm = straight(context).map_or(0.0, |[_, ohm, _]| (-ohm).max(0.0));
             let first = (measured.len() / FIRST.0).max(FIRST.1).min(measured.len());
             let mut open: Vec<f64> = measured[..first].iter().zip(current.iter()).map(|(v, i)| v + ohm * i).collect();
             let pack = Self::with(median(&mut open));
