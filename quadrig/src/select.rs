@@ -23,7 +23,9 @@ use ident::log::digest;
 use ident::log::quantity::{AmpereHour, Kilogram, Minute, Newton};
 use ident::plateau::plateaus;
 use ident::report::{WIDEST, selection, tenths, wrapped};
-use ident::sizing::select::{Airframe, Need, Pair, Row, choose, from_log, is_repeated, misses, read_table, row, thesis, why};
+use ident::sizing::select::{
+    Airframe, LEVELS, Need, Pair, Row, choose, from_log, is_repeated, misses, read_levels, read_table, row, thesis, why,
+};
 use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -53,7 +55,7 @@ impl Limit {
 /// Arguments.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Rig logs or exports, or tables `motor,propeller,thrust_n,current_a`; none: the figures that the thesis states.
+    /// Rig logs or exports, tables of `identify --table`, or tables `motor,propeller,thrust_n,current_a`; none: the figures that the thesis states.
     files: Vec<PathBuf>,
     /// Flies every pair of the simulator's catalogue.
     #[arg(long, conflicts_with = "files")]
@@ -210,17 +212,25 @@ fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<(Vec<Pair>, Vec<Str
         let expected = "expected rig logs, exports or tables: name the files in it";
         return Err(format!("{}: is a folder; {expected}, such as {}", path.display(), path.join("*.csv").display()).into());
     }
-    if is_table(path)? {
-        let file = std::fs::File::open(path).map_err(unread(path))?;
-        let table = read_table(&path.display().to_string(), BufReader::new(file))?;
+    let shown = path.display().to_string();
+    let source = || Ok::<_, Failure>(BufReader::new(std::fs::File::open(path).map_err(unread(path))?));
+    let head = head_of(path)?;
+    if head.starts_with("motor") {
+        let table = read_table(&shown, source()?)?;
         return Ok((table.pairs, table.left_out.iter().map(ToString::to_string).collect()));
     }
-    let mut log = open(path, &args.columns.named(None, None), quiet)?;
+    let (mut log, plateaus) = if head.starts_with(&LEVELS.join(",")) {
+        read_levels(&shown, &name_of(path), source()?)?
+    } else {
+        let log = open(path, &args.columns.named(None, None), quiet)?;
+        let plateaus = settled(&Context::new(&log, None), &log);
+        (log, plateaus)
+    };
     let given = [("motor", &args.motor), ("propeller", &args.propeller)];
     for (key, value) in given.into_iter().filter_map(|(k, v)| Some((k, v.as_ref()?))) {
         log.meta.entry(key.to_owned()).or_insert_with(|| toml::Value::String(value.clone()));
     }
-    let pair = from_log(&log, &settled(&Context::new(&log, None), &log));
+    let pair = from_log(&log, &plateaus);
     if pair.maximum.is_none() {
         let expected =
             "expected a run with thrust_n and current_a on levels of at least 5 rows, or a table with a row for each level";
@@ -229,14 +239,14 @@ fn pairs_of(path: &Path, args: &Args, quiet: bool) -> Result<(Vec<Pair>, Vec<Str
     Ok((vec![pair], Vec::new()))
 }
 
-/// Whether the first line that is no comment names motors.
-fn is_table(path: &Path) -> Result<bool, Failure> {
+/// The first line that is no comment; nothing of a rig log, which says in its first line what it is.
+fn head_of(path: &Path) -> Result<String, Failure> {
     let file = std::fs::File::open(path).map_err(unread(path))?;
     let mut head = Vec::new();
     std::io::Read::take(file, 4096).read_to_end(&mut head).map_err(unread(path))?;
     let head = String::from_utf8_lossy(&head).into_owned();
-    let own = head.starts_with("# quadrig-");
-    Ok(!own && head.lines().find(|l| !l.starts_with('#') && !l.trim().is_empty()).is_some_and(|l| l.trim().starts_with("motor")))
+    let first = head.lines().map(str::trim).find(|l| !l.starts_with('#') && !l.is_empty());
+    Ok(first.filter(|_| !head.starts_with("# quadrig-")).unwrap_or_default().to_owned())
 }
 
 /// Every motor with every propeller that the simulator knows, on a short staircase.

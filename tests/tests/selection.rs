@@ -53,6 +53,12 @@ fn a_measured_run_is_a_pair_and_knows_its_hover() {
     let hover = row["with_batteries"][0]["hover_min"].as_f64().expect("the levels give the current in hover");
     let full = row["with_batteries"][0]["full_throttle_min"].as_f64().unwrap();
     assert!((15.0..35.0).contains(&hover) && hover > 1.5 * full, "{hover} {full}");
+    // the table of the same run's levels tells the same, and nothing of whose they are
+    call(folder.path(), &["--quiet", "identify", "run.csv", "-o", "model.toml", "--table", "levels.csv"]).succeeded();
+    let said = call(folder.path(), &["select", "levels.csv", "--motor", "570KV", "--json"]).succeeded();
+    let json: Value = serde_json::from_str(&said.out).unwrap();
+    let of_table = json["rows"][0]["with_batteries"][0]["hover_min"].as_f64().expect("the same levels");
+    assert!((of_table / hover - 1.0).abs() < 1e-4, "{of_table} {hover}");
     let said = call(folder.path(), &["beam", "--run", "run.csv"]).succeeded();
     assert_eq!(said.err.lines().count(), 2, "{}", said.err);
     assert!(said.err.contains("resonance at 2511 rev/min (unbalance") && said.err.contains("1255 rev/min (blade pass)"));

@@ -7,9 +7,11 @@
 //! Units: newtons and amperes of one motor; kilograms of the whole machine; minutes.
 //! Reference: Beharie 2013, Eq. 2.91 (resultant = 4 T - m g), 5.59 (endurance) and 6.1 (efficiency), Tables 8 and 9.
 
+mod levels;
 mod pairs;
 mod why;
 
+pub use levels::{LEVELS, read_levels};
 pub use pairs::{from_log, read_table, thesis};
 pub use why::{is_repeated, misses, why};
 
