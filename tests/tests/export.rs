@@ -281,8 +281,11 @@ fn battery_and_delays_are_told() {
         assert_ne!(of(peer, &["--cells", "4"]), of(peer, &[]), "{peer} tells the cells");
         assert!(of(peer, &[]).contains("(--cells)"), "{peer} says what it lacks");
     }
-    let keys = px4(&of("px4", &["--cells", "4"]));
+    let keys = px4(&of("px4", &["--cells", "4", "--rig-supply"]));
     assert_eq!((keys["BAT1_N_CELLS"], keys["BAT1_R_INTERNAL"]), (4.0, 0.012));
+    // a bench supply's lead is no battery's resistance
+    let bench_only = of("px4", &["--cells", "4"]);
+    assert!(!px4(&bench_only).contains_key("BAT1_R_INTERNAL") && bench_only.contains("--rig-supply"), "{bench_only}");
     assert!(!px4(&of("px4", &[])).keys().any(|key| key.starts_with("BAT1")));
     let text = of("betaflight", &["--cells", "4"]);
     let set = |key: &str| after(&text, &format!("set {key} ="));

@@ -26,8 +26,8 @@ use std::path::PathBuf;
 /// Whose file.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Peer {
-    /// Parameter file of QGroundControl: THR_MDL_FAC, CA_ROTORn_CT, CA_ROTORn_KM, PWM_MAIN_MINn, with --cells BAT1_N_CELLS and BAT1_R_INTERNAL, with --capacity
-    /// BAT1_CAPACITY.
+    /// Parameter file of QGroundControl: THR_MDL_FAC, CA_ROTORn_CT, CA_ROTORn_KM, PWM_MAIN_MINn, with --cells BAT1_N_CELLS, with --cells and --rig-supply
+    /// BAT1_R_INTERNAL, with --capacity BAT1_CAPACITY.
     Px4,
     /// Parameter file: MOT_THST_EXPO, MOT_SPIN_ARM, _MIN and _MAX, with --cells MOT_BAT_VOLT_MAX and _MIN, with --capacity BATT_CAPACITY.
     Ardupilot,
@@ -58,6 +58,9 @@ pub(crate) struct Args {
     /// Capacity of that battery, mAh, as printed on it: no model knows it.
     #[arg(long, value_name = "MAH", value_parser = crate::number::whole::<u32>(1, 100_000, "mAh"))]
     capacity: Option<u32>,
+    /// The rig ran on the battery and the leads that will fly: their resistance goes into the file (px4). A bench supply's does not belong there.
+    #[arg(long)]
+    rig_supply: bool,
     /// Writes the file although more of its full thrust is computed than was measured.
     #[arg(long)]
     extrapolate: bool,
@@ -86,7 +89,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<(), Failure> {
         )
         .into());
     }
-    let battery = Battery { cells: args.cells, capacity_mah: args.capacity };
+    let battery = Battery { cells: args.cells, capacity_mah: args.capacity, of_the_rig: args.rig_supply };
     let text = match args.to {
         Peer::Px4 => px4::text(&plant, args.rotors, battery),
         Peer::Ardupilot => ardupilot::text(&plant, battery),
@@ -119,6 +122,8 @@ struct Battery {
     /// In series.
     cells: Option<u32>,
     capacity_mah: Option<u32>,
+    /// The rig ran on it.
+    of_the_rig: bool,
 }
 
 impl Battery {

@@ -58,13 +58,17 @@ pub(super) fn text(plant: &Powerplant, rotors: u32, battery: Battery) -> String 
             arm.unwrap_or(0.0)
         ),
     }));
-    let per_cell = battery.cells.zip(plant.lead_ohm).map(|(cells, lead_ohm)| lead_ohm / f64::from(cells));
-    head.extend(
-        per_cell.map(|_| "BAT1_R_INTERNAL: the resistance of the rig's supply and its lead, shared among the cells".to_owned()),
-    );
+    let per_cell = battery.cells.zip(plant.lead_ohm).filter(|_| battery.of_the_rig);
+    let per_cell = per_cell.map(|(cells, lead_ohm)| lead_ohm / f64::from(cells));
+    head.extend(per_cell.map(|_| {
+        "BAT1_R_INTERNAL: the resistance of the rig's supply and its lead, shared among the cells (--rig-supply)".to_owned()
+    }));
     let no_battery = match (battery.cells, plant.lead_ohm) {
         (None, _) => Some("BAT1_N_CELLS, BAT1_R_INTERNAL: the battery that will fly is not known (--cells)"),
         (_, None) => Some("BAT1_R_INTERNAL: the model holds no resistance of the supply"),
+        _ if !battery.of_the_rig => Some(
+            "BAT1_R_INTERNAL: the resistance below is that of the rig's supply; where the rig ran on what will fly: --rig-supply",
+        ),
         _ => None,
     };
     // what has a key is told by it
