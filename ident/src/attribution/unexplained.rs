@@ -151,7 +151,11 @@ pub(crate) fn wanders(target: &Target, residual: &[f64]) -> bool {
 /// The shape of a residual in words.
 pub(crate) fn looks_like(context: &Context, target: &Target, residual: &[f64]) -> String {
     let squares = told_squares(target, residual);
-    let pace = match look(target, residual, &squares) {
+    let look = look(target, residual, &squares);
+    if !matches!(look, Look::OnTheWay | Look::InOne(_)) && is_behind_steps(context, target, &squares) {
+        return BEHIND_STEPS.to_owned();
+    }
+    let pace = match look {
         Look::OnTheWay => return "while the load is on its way".to_owned(),
         Look::InOne(stretch) => return in_one(context, target, &stretch),
         Look::InSingleRows => return "in single rows".to_owned(),
@@ -187,6 +191,32 @@ fn is_filled(stretch: &[f64]) -> bool {
         Some(*sum)
     });
     2 * (sums.take_while(|sum| *sum < enough).count() + 1) >= stretch.len()
+}
+
+/// What is said of a residual that lies there.
+pub(crate) const BEHIND_STEPS: &str = "right behind steps of the command";
+/// Part of a hold of the command that is its beginning, and most of the rows that may lie in one: a command that never stops has no steps.
+const BEGINNING: (f64, f64) = (0.1, 0.25);
+
+/// Whether most of a residual's squares lie in the beginnings of holds: the first tenth of the time from one change of the command to the next.
+fn is_behind_steps(context: &Context, target: &Target, squares: &[f64]) -> bool {
+    let Some(pulse) = context.pulse.as_ref().filter(|_| !context.time_is_row) else { return false };
+    let steps: Vec<usize> = (1..pulse.len()).filter(|i| (pulse[*i] - pulse[*i - 1]).abs() > 0.5).collect();
+    let mut begins = vec![false; context.len()];
+    for (k, from) in steps.iter().enumerate() {
+        let to = steps.get(k + 1).copied().unwrap_or(context.len() - 1);
+        let until = context.t[*from] + BEGINNING.0 * (context.t[to] - context.t[*from]);
+        (*from..to).take_while(|i| context.t[*i] <= until).for_each(|i| begins[i] = true);
+    }
+    let (mut inside, mut whole, mut rows) = (0.0, 0.0, 0);
+    for (row, square) in target.rows.iter().zip(squares) {
+        whole += square;
+        if begins.get(*row).is_some_and(|b| *b) {
+            inside += square;
+            rows += 1;
+        }
+    }
+    2.0 * inside > whole && (rows as f64) < BEGINNING.1 * squares.len() as f64
 }
 
 /// Where a stretch of a target's samples lies in the log.

@@ -9,6 +9,7 @@ use super::page::Page;
 use super::sentence::{floors_left, goes_beyond_noise, instead, size_left, without};
 use super::state::EXPLAINED;
 use super::vocabulary::Vocabulary;
+use crate::attribution::unexplained::BEHIND_STEPS;
 use crate::report::figure::Figure;
 use crate::report::sheet::{Sheet, data_uri};
 use crate::report::svg::escape;
@@ -118,6 +119,7 @@ fn looks_and_goes_beyond(v: &Verdict, u: &Unexplained, shared: Option<&str>) -> 
         ([], Some(part)) => part.trim_start_matches("goes with ").to_owned(),
         // what it looks like says so
         ([], None) if own.contains("grows with the load") => "the load".to_owned(),
+        ([], None) if own.contains(BEHIND_STEPS) => "the steps".to_owned(),
         ([], None) if !u.depends_on.is_empty() => format!("{} still", channels(&u.depends_on)),
         ([], None) => "nothing in the log".to_owned(),
         (with, _) => with.join(", "),

@@ -193,7 +193,8 @@ fn left(verdict: &Verdict) -> String {
     for u in verdict.unexplained.iter().filter(|u| !verdict.channels.not_predicted.contains_key(&u.channel)) {
         let (looks, goes) = looks_and_goes(verdict, u, shared.as_deref());
         // what it looks like says so
-        let silent = goes == "nothing in the log" || goes == "the load" && looks.contains("grows with the load");
+        let told = goes == "the load" && looks.contains("grows with the load") || goes == "the steps";
+        let silent = goes == "nothing in the log" || told;
         let on = if silent { String::new() } else { format!(", goes with {goes}") };
         let of = [channel(&u.channel), size_told(verdict, u), format!("{:.1} noise floors", floors_left(verdict, u))];
         let [name, size, floors] = of;
