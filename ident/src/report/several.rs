@@ -26,7 +26,10 @@ const MOST_NAMES: usize = 12;
 pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
     let v = &*outcome.verdict.briefly();
     let alone: Vec<Closed> = (0..runs.len()).map(|run| of_run(runs, outcome, run)).collect();
-    let first = outcome.shown.as_ref().map_or(0, |shown| shown.run);
+    // of the quantity that the sentence begins with, or else where the names took most
+    let headed = parts::headed(v, Vocabulary::RIG);
+    let shown = outcome.shown.iter().find(|shown| headed(shown.channel)).or(outcome.shown.first());
+    let first = shown.map_or(0, |shown| shown.run);
     let loudest = parts::loudest(v);
     let own = |u: &&Unexplained| !is_drawn_together(&alone[first], u) || loudest.is_some_and(|l| l == *u);
     let on = |run: usize, figure: Figure| named(figure, &v.runs[run].run);
@@ -36,7 +39,7 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         news: false,
         origin: Origin::of_several(&runs.iter().map(|r| &r.log).collect::<Vec<_>>()),
         declared: "Before: the declared baseline, one set of static curves for all runs, one constant a channel and run. After: the same with every effect of the rig that is named above. The error is that of a run predicted by a fit to the other runs, as the root of the mean square over the runs.".to_owned(),
-        hero: outcome.shown.iter().flat_map(|shown| over_runs(v, shown)).map(|figure| on(first, figure)).collect(),
+        hero: shown.iter().flat_map(|shown| over_runs(v, shown)).map(|figure| on(first, figure)).collect(),
         cards: v.effects.iter().enumerate().map(|(k, e)| card(&alone, outcome, v, k, e)).collect(),
         left: v.unexplained.iter().zip(&outcome.left).filter(|(u, _)| own(u)).filter_map(|(u, shown)| left_of(&alone, u, shown.as_ref())).map(|(run, figure)| on(run, figure)).collect(),
         readings: outcome.contexts.iter().zip(&v.runs).flat_map(|(c, run)| readings_apart(c, v, &run.run)).collect(),

@@ -39,8 +39,8 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// For each effect of the rig its parameters on each run alone; empty where the run cannot tell.
     pub alone: Vec<Vec<Vec<Estimate>>>,
-    /// Where the names took most.
-    pub shown: Option<Shown>,
+    /// Of each channel the run on which the names took most, the channel on which they took most first.
+    pub shown: Vec<Shown>,
     /// For each effect of the rig where it took most: before without it, after with it.
     pub each: Vec<Option<Shown>>,
     /// For each channel that the verdict leaves unexplained the run on which it is loudest.
@@ -68,11 +68,17 @@ pub struct Shown {
     pub after: Vec<f64>,
 }
 
-/// The channel and run on which the names took most, with what is left of it.
-fn shown(tenable: &Tenable<'_>) -> Option<Shown> {
-    let most =
-        tenable.compared.iter().filter(|c| !is_contrast(c.before.channel)).max_by(|a, b| a.times().total_cmp(&b.times()))?;
-    shown_on(tenable, (most.before.run, most.before.channel), &[])
+/// Of each channel the run on which the names took most, with what is left of it; the channel on which they took most first.
+fn shown(tenable: &Tenable<'_>) -> Vec<Shown> {
+    let mut each: Vec<_> = tenable.compared.iter().filter(|c| !is_contrast(c.before.channel)).collect();
+    each.sort_by(|a, b| b.times().total_cmp(&a.times()));
+    let mut seen: Vec<&str> = Vec::new();
+    each.retain(|c| {
+        let new = !seen.contains(&c.before.channel);
+        seen.push(c.before.channel);
+        new
+    });
+    each.iter().filter_map(|c| shown_on(tenable, (c.before.run, c.before.channel), &[])).collect()
 }
 
 /// What is left of a channel of a run, predicted by a fit to the others: before with fewer effects, after with all.

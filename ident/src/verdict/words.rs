@@ -145,13 +145,12 @@ pub fn adverb(probability: f64) -> &'static str {
     }
 }
 
-/// How sure a probability is, as a word of its own.
+/// How sure a probability is, as a word of its own: the sentence says the same.
 #[must_use]
 pub fn sureness(probability: f64) -> &'static str {
     match probability {
         p if p >= SURE => "sure",
-        p if p >= 0.6 => "likely",
-        _ => "unsure",
+        p => adverb(p),
     }
 }
 

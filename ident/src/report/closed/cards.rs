@@ -168,7 +168,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     let there = if open_sizes(e).is_some() || !zero.is_empty() && !told { " that it is there" } else { "" };
     // what has no name is sure of nothing but that something is there
     let nameless = e.id == "unknown";
-    let sure = if nameless { "unsure" } else { sureness(e.told_probability()) };
+    let sure = if nameless { "perhaps" } else { sureness(e.told_probability()) };
     let against = rivals(v, page.words, k);
     let chip = if nameless {
         format!("no name; {}", that_it_is_there(e.probability))
@@ -496,7 +496,7 @@ mod tests {
         };
         let (known, open) = ([0.05, 0.15], [-0.1, 0.3]);
         assert_eq!(told(&[("width", known)]), ("sure", String::new()));
-        assert_eq!(told(&[("width", open)]), ("likely", "; width may be zero".to_owned()));
+        assert_eq!(told(&[("width", open)]), ("probably", "; width may be zero".to_owned()));
         assert_eq!(told(&[("width", known), ("slack", open)]), ("sure", "; play before it turns may be zero".to_owned()));
         assert_eq!(told(&[("width", known), ("t0", open)]), ("sure", String::new()));
     }
@@ -506,8 +506,8 @@ mod tests {
     fn what_a_name_lacks_is_told() {
         let e = EffectEntry { probability: 0.63, ..bare_entry("creep") };
         let rival = |probability: f64| Rival { ids: vec!["stall".into()], said: "the blades stall".into(), probability };
-        assert_eq!(contest(&e, "likely", &[rival(0.3)], 0.0), "likely: p = 0.63, rival = 0.30");
-        assert_eq!(contest(&e, "likely", &[], 0.25), "likely: p = 0.63, other names or none = 0.25");
-        assert_eq!(contest(&e, "likely", &[rival(0.001)], 0.0), "likely: p = 0.63, no rival");
+        assert_eq!(contest(&e, "probably", &[rival(0.3)], 0.0), "probably: p = 0.63, rival = 0.30");
+        assert_eq!(contest(&e, "probably", &[], 0.25), "probably: p = 0.63, other names or none = 0.25");
+        assert_eq!(contest(&e, "probably", &[rival(0.001)], 0.0), "probably: p = 0.63, no rival");
     }
 }

@@ -5,7 +5,7 @@
 //! Units: the channel's.
 //! Reference: component-plus-residual plots: Larsen & McCleary 1972, Technometrics 14:781.
 
-use super::sentence::{order, whole};
+use super::sentence::{begins_with, whole};
 use super::vocabulary::Vocabulary;
 use crate::numeric::order::median;
 use crate::report::figure::{Figure, Layer, Mark};
@@ -156,14 +156,21 @@ pub(crate) fn part(trace: &Trace, id: &str, names: [&'static str; 2], wide: f64)
     })
 }
 
+/// Whether a channel is of the quantity that the sentence begins with; where it begins with no cause, each is.
+pub(crate) fn headed(verdict: &Verdict, words: Vocabulary) -> impl Fn(&str) -> bool {
+    let told = begins_with(verdict, words);
+    move |channel| {
+        told.is_none_or(|e| {
+            let of_first = |first: &String| whole(verdict, first) == whole(verdict, channel);
+            e.channels.iter().any(|c| c == channel) && e.channels.first().is_some_and(of_first)
+        })
+    }
+}
+
 /// The channel that the sentence begins with, over time and enlarged; without names the loudest.
 pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Vec<Figure> {
-    let own = |e: &&EffectEntry| e.id != "unknown" && !(words.of_every_rig)(e) && !e.is_of_single_readings();
-    let told = order(verdict, words).into_iter().map(|k| &verdict.effects[k]).find(own);
     // of several sensors or axes of one quantity the one that shows most
-    let is_told = |e: &EffectEntry, c: &String| {
-        e.channels.contains(c) && e.channels.first().is_some_and(|first| whole(verdict, first) == whole(verdict, c))
-    };
+    let headed = headed(verdict, words);
     let weight = |t: &&Trace| {
         verdict.channels.get(&t.channel).map_or(0.0, |c| match verdict.verdict {
             // a ratio of two figures beneath the floor tells nothing
@@ -171,9 +178,7 @@ pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Ve
             Kind::Unattributed | Kind::None => c.after.heldout_rms / c.noise_floor_rms,
         })
     };
-    let Some(trace) =
-        traces.iter().filter(|t| told.is_none_or(|e| is_told(e, &t.channel))).max_by(|a, b| weight(a).total_cmp(&weight(b)))
-    else {
+    let Some(trace) = traces.iter().filter(|t| headed(&t.channel)).max_by(|a, b| weight(a).total_cmp(&weight(b))) else {
         return Vec::new();
     };
     // what a name does not take off its channel cannot be seen there

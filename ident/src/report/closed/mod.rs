@@ -23,8 +23,8 @@ mod terminal;
 mod vocabulary;
 
 pub(crate) use evidence::{
-    ALONE, SEEN, Trace, against, enlarged, lifted, most, moves, over_time, pair, part, rest, scatter, shown_most, slug, thinned,
-    two_ways,
+    ALONE, SEEN, Trace, against, enlarged, headed, lifted, most, moves, over_time, pair, part, rest, scatter, shown_most, slug,
+    thinned, two_ways,
 };
 pub(crate) use fold::{aside, candidates};
 pub(crate) use look::{LOOK, SCRIPT};

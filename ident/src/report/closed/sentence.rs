@@ -116,12 +116,7 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         return [said, left(verdict)].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
     }
     let all = if own.is_empty() { &common } else { &own };
-    // what takes next to nothing, or is of sizes that may be nothing, stands on its card alone, unless there is nothing else
-    let known = |e: &EffectEntry| !e.is_of_single_readings() && e.open_sizes().is_none();
-    let large = |e: &&&EffectEntry| ((e.heldout_error_reduction >= SMALL || shown_by_readings(e)) && known(e)) || all.len() == 1;
-    // no name stands above a likelier one
-    let likely: Vec<&EffectEntry> = all.iter().filter(large).filter(|e| !beaten(verdict, words, e)).copied().collect();
-    let told = headed(verdict, &likely);
+    let told = headed(verdict, &likely(verdict, words, all));
     let Some(first) = told.first().or(all.first()) else { return String::new() };
     if told.is_empty() && beaten(verdict, words, first) {
         return contested(verdict, words, news, &[*first]);
@@ -145,6 +140,20 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         .filter(|s| !s.is_empty())
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// Of some causes those that the sentence may name. What takes next to nothing, or is of sizes that may be nothing, stands on its card alone, unless
+/// there is nothing else; no name stands above a likelier one.
+fn likely<'v>(verdict: &Verdict, words: Vocabulary, all: &[&'v EffectEntry]) -> Vec<&'v EffectEntry> {
+    let known = |e: &EffectEntry| !e.is_of_single_readings() && e.open_sizes().is_none();
+    let large = |e: &&&EffectEntry| ((e.heldout_error_reduction >= SMALL || shown_by_readings(e)) && known(e)) || all.len() == 1;
+    all.iter().filter(large).filter(|e| !beaten(verdict, words, e)).copied().collect()
+}
+
+/// The cause of this rig that the sentence begins with.
+pub(super) fn begins_with(verdict: &Verdict, words: Vocabulary) -> Option<&EffectEntry> {
+    let own: Vec<&EffectEntry> = named(verdict, words).0.into_iter().filter(|e| !e.is_of_single_readings()).collect();
+    likely(verdict, words, &own).first().or(own.first()).copied()
 }
 
 /// Clauses as a sentence that two lines of a head hold, and as many as that has no room for in a second one.
