@@ -268,7 +268,9 @@ fn grows_with_the_load(context: &Context, target: &Target, squares: &[f64]) -> b
 
 #[cfg(test)]
 mod tests {
-    use super::{Look, is_filled, loudest_stretch, neighbours_agree, of_few_rows};
+    use super::{Look, is_behind_steps, is_filled, loudest_stretch, neighbours_agree, of_few_rows};
+    use crate::channel::Context;
+    use crate::log::{Column, Log};
 
     #[test]
     fn two_edges_with_nothing_between_are_no_stretch() {
@@ -287,6 +289,26 @@ mod tests {
         assert_eq!(look(&|i| i % 400 < 8), Look::InBursts);
         assert_eq!(look(&|i| i % 400 == 7), Look::InSingleRows);
         assert!(matches!(look(&|i| (2000..2030).contains(&i)), Look::InOne(_)));
+    }
+
+    /// A staircase of ten holds: what is loud at the beginning of each lies behind the steps, what is loud in the middle does not. A command that
+    /// wanders on with each row has no steps.
+    #[test]
+    fn what_begins_with_a_hold_lies_behind_the_step() {
+        let behind = |pulse: &dyn Fn(usize) -> f64, loud: &dyn Fn(usize) -> bool| {
+            let wave = |i: usize| (0.7 * (i * i) as f64).sin();
+            let pulses: Vec<f64> = (0..1000).map(pulse).collect();
+            let rpm = pulses.iter().enumerate().map(|(i, p)| 7.0 * (p - 1000.0) + wave(i)).collect();
+            let columns = vec![Column { name: "pulse_us".into(), values: pulses }, Column { name: "rpm".into(), values: rpm }];
+            let context = Context::new(&Log { t: (0..1000).map(|i| 0.1 * i as f64).collect(), columns, ..Log::default() }, None);
+            let target = context.targets.iter().find(|t| t.name == "rpm").expect("a speed");
+            let squares: Vec<f64> = target.rows.iter().map(|row| if loud(*row) { 400.0 } else { wave(*row).powi(2) }).collect();
+            is_behind_steps(&context, target, &squares)
+        };
+        let stairs = |i: usize| 1100.0 + 50.0 * (i / 100) as f64;
+        assert!(behind(&stairs, &|i| i % 100 < 4));
+        assert!(!behind(&stairs, &|i| (50..54).contains(&(i % 100))));
+        assert!(!behind(&|i| 1100.0 + i as f64, &|i| i % 100 < 4));
     }
 
     #[test]

@@ -325,6 +325,7 @@ impl<'w> Whole<'w> {
             silent: false,
             stuck: false,
             timeless: false,
+            readings: vec![s.value],
         });
         Verdict {
             format: FORMAT,

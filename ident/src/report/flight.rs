@@ -58,7 +58,6 @@ pub fn page(closed: &Closed, origin: Origin) -> String {
         cards: cards(closed, &traces),
         left: parts::rest(v, &alone),
         readings: Vec::new(),
-        counted: Vec::new(),
         parameters: Vec::new(),
         speeds: ("The rotors' speeds", speeds(closed, &of_rotors)),
     };

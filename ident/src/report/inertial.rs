@@ -83,7 +83,6 @@ pub fn page(recording: &Recording, closed: &Closed, origin: Origin) -> String {
         cards: cards(recording, closed),
         left: parts::rest(v, &traces),
         readings: Vec::new(),
-        counted: Vec::new(),
         parameters: Vec::new(),
         speeds: ("", Vec::new()),
     };

@@ -42,7 +42,6 @@ pub fn closed_loop(log: &Log, closed: &Closed, origin: Origin) -> String {
         cards: cards(log, closed),
         left: left(closed),
         readings: readings_apart(&closed.context, v, ""),
-        counted: v.effects.iter().map(|e| counted(log, v, e)).collect(),
         parameters: Vec::new(),
         speeds: (SPEEDS, speeds(log, closed)),
     };
@@ -129,30 +128,6 @@ fn hero(log: &Log, closed: &Closed) -> Vec<Figure> {
 fn beside_others<'c>(closed: &'c Closed, e: &EffectEntry) -> Option<&'c Target> {
     let unseen = 1.0 - e.heldout_error_reduction > 1.0 / parts::SEEN;
     target(closed, &format!("{} - others", e.channels.first()?)).filter(|_| unseen)
-}
-
-/// Share of the speed that a reading which times one period loses with a pulse, and how near to it a loss must be.
-const HALVED: (f64, f64) = (0.5, 0.05);
-
-/// The share of its pulses that a sensor misses with the readings counted in that were set aside; each of them against the median of the other
-/// sensors in its row. Nothing where none was set aside.
-fn counted(log: &Log, v: &Verdict, e: &EffectEntry) -> Option<f64> {
-    let own = log.column(e.channels.first().filter(|_| e.id == "missed_pulses")?)?;
-    let fitted = e.parameter("probability")?.value;
-    let others: Vec<&[f64]> =
-        SPEED.iter().filter(|name| e.channels.first().is_none_or(|c| c != *name)).filter_map(|name| log.column(name)).collect();
-    let lost = |row: usize| {
-        let mut said: Vec<f64> = others.iter().filter_map(|c| c.get(row)).copied().filter(|v| v.is_finite()).collect();
-        let (of, truth) = (own.get(row)?, median(&mut said));
-        (truth > 0.0 && of.is_finite()).then(|| (1.0 - of / truth).clamp(0.0, 1.0))
-    };
-    // a reading of one period is halved by each pulse that it loses: what counts is how many are
-    let timed = e.parameter("depth").is_some_and(|d| (d.value - HALVED.0).abs() < HALVED.1);
-    let share = |loss: f64| if timed { f64::from(u8::from(loss > 0.5 * HALVED.0)) } else { loss };
-    let aside: Vec<f64> = parts::struck(v, e).flat_map(|a| a.row..a.row + a.rows).filter_map(lost).map(share).collect();
-    let judged = own.iter().filter(|v| **v > 0.0).count().saturating_sub(aside.len());
-    let all = (judged + aside.len()) as f64;
-    (!aside.is_empty()).then(|| (fitted * judged as f64 + aside.iter().sum::<f64>()) / all)
 }
 
 /// Rows before and after whose median a single reading is held against.
@@ -565,9 +540,6 @@ mod tests {
     use super::*;
     use crate::close::close;
     use crate::log::Column;
-    use crate::report::bare_entry;
-    use crate::signal::bad::SetAside;
-    use crate::verdict::Parameter;
 
     /// A staircase on a supply behind a lead of so many ohms: the speed follows the voltage.
     fn run(lead: f64) -> Log {
@@ -607,37 +579,6 @@ mod tests {
         let beyond = torque_beyond(&closed, thrust).expect("a torque");
         let largest = beyond.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
         assert!(beyond.len() == claimed(thrust).count() && largest < 0.2 * most && largest > 1e-3, "{largest} of {most}");
-    }
-
-    /// Readings that were set aside count with the pulses that the others lost.
-    #[test]
-    fn readings_set_aside_count_by_what_they_lost() {
-        let truth = vec![4000.0; 1000];
-        let own: Vec<f64> = (0..1000).map(|i| if (100..110).contains(&i) { 3000.0 } else { 4000.0 }).collect();
-        let columns = [("rpm_opto", own), ("rpm_hall", truth.clone()), ("rpm_beam", truth)];
-        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
-        let log = Log { t: (0..1000).map(f64::from).collect(), columns, ..Log::default() };
-        let size = Parameter { name: "probability".into(), value: 0.01, unit: "1".into(), ci95: [0.008, 0.012] };
-        let e = EffectEntry { channels: vec!["rpm_opto".into()], parameters: vec![size], ..bare_entry("missed_pulses") };
-        let aside = SetAside {
-            channel: "rpm_opto".into(),
-            row: 100,
-            rows: 10,
-            t_s: 100.0,
-            until_s: 109.0,
-            value: 3000.0,
-            expected: 4000.0,
-            recurs: false,
-            silent: false,
-            stuck: false,
-            timeless: false,
-        };
-        let mut v = parts::bare_verdict(Vec::new());
-        assert_eq!(counted(&log, &v, &e), None);
-        v.set_aside = vec![aside];
-        // 990 readings that lose a hundredth, ten that lose a quarter
-        let whole = counted(&log, &v, &e).expect("some were set aside");
-        assert!((whole - (9.9 + 2.5) / 1000.0).abs() < 1e-9, "{whole}");
     }
 
     #[test]

@@ -43,7 +43,6 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
         cards: v.effects.iter().enumerate().map(|(k, e)| card(&alone, outcome, v, k, e)).collect(),
         left: v.unexplained.iter().zip(&outcome.left).filter(|(u, _)| own(u)).filter_map(|(u, shown)| left_of(&alone, u, shown.as_ref())).map(|(run, figure)| on(run, figure)).collect(),
         readings: outcome.contexts.iter().zip(&v.runs).flat_map(|(c, run)| readings_apart(c, v, &run.run)).collect(),
-        counted: Vec::new(),
         parameters: parameters(outcome, v),
         speeds: (SPEEDS, speeds(&runs[first].log, &alone[first]).into_iter().map(|figure| on(first, figure)).collect()),
     };

@@ -60,6 +60,9 @@ pub struct SetAside {
     /// Of a log without a time: its row is all that is known of when.
     #[serde(skip)]
     pub timeless: bool,
+    /// What the channel read on them, row by row.
+    #[serde(skip)]
+    pub readings: Vec<f64>,
 }
 
 impl fmt::Display for SetAside {
@@ -284,6 +287,7 @@ fn told(log: &Log, name: &str, column: &[f64], event: &Event) -> Option<SetAside
         silent: event.silent,
         stuck,
         timeless: log.time_is_row(),
+        readings: column[first..first + rows].to_vec(),
     })
 }
 
@@ -294,7 +298,8 @@ mod tests {
     fn one(value: f64, expected: f64, stuck: bool) -> SetAside {
         let (channel, rows) = ("rpm_beam".to_owned(), if stuck { 12 } else { 1 });
         let [recurs, silent, timeless] = [false; 3];
-        SetAside { channel, row: 1, rows, t_s: 0.1, until_s: 0.1, value, expected, recurs, silent, stuck, timeless }
+        let readings = vec![value; rows];
+        SetAside { channel, row: 1, rows, t_s: 0.1, until_s: 0.1, value, expected, recurs, silent, stuck, timeless, readings }
     }
 
     fn aside(value: f64, expected: f64, stuck: bool) -> String {

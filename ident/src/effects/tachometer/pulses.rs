@@ -194,12 +194,13 @@ const HALVED: (f64, f64) = (0.5, 0.05);
 const STRUCK: f64 = 6.0;
 const STRUCK_LEAST: f64 = 0.002;
 
-/// Probability of a lost (`sign` -1) or doubled (+1) pulse, from the readings that are grossly off: the mean share that is lost or won, which
+/// Probability of a lost (`sign` -1) or doubled (+1) pulse, from the readings that are grossly off, those that were set aside among them: the mean share that is lost or won, which
 /// is that of a pulse whether a window holds many or one; where each loss halves the reading at every speed single periods are timed,
 /// and the share of such readings is the probability.
 fn pulse_probability(context: &Context, target: &Target, sign: f64) -> Estimate {
-    let departures: Vec<(f64, f64)> =
-        against_the_others(context, target, STEADY).into_iter().map(|(d, late)| (sign * d, late)).collect();
+    let judged = against_the_others(context, target, STEADY);
+    let aside = set_aside(context, target, sign).into_iter().map(|departure| (departure, 0.0));
+    let departures: Vec<(f64, f64)> = judged.into_iter().chain(aside).map(|(d, late)| (sign * d, late)).collect();
     let mut sizes: Vec<f64> = departures.iter().map(|d| d.0.abs()).collect();
     // one pulse among many is less than a gross error, and still far outside of the scatter
     let least = (STRUCK * 1.4826 * median(&mut sizes)).clamp(STRUCK_LEAST, GROSS);
@@ -222,10 +223,9 @@ fn relative_error_of_a_count(count: usize) -> f64 {
     (upper - count as f64) / 1.96 / count as f64
 }
 
-/// What a channel departs from the mean of the other channels by, as a share of it, on the rows of [`readings`] whose speed changed by less
-/// than a share, and what lateness could explain: the consensus holds the channel itself.
-pub(crate) fn against_the_others(context: &Context, target: &Target, limit: f64) -> Vec<(f64, f64)> {
-    let own = DIFFERENCES.iter().find(|d| d.1 == target.name).map_or("", |d| d.0);
+/// Sum and number of the readings of the other speed channels on each row: the consensus holds the channel itself.
+fn of_the_others(context: &Context, target: &Target) -> Vec<(f64, f64)> {
+    let own = own_channel(target);
     let speeds = context.targets.iter().filter(|t| matches!(t.relation, Relation::SpeedFromPulse | Relation::SpeedAlone));
     let mut sums = vec![(0.0, 0.0); context.len()];
     for other in speeds.filter(|t| t.name != own) {
@@ -234,6 +234,18 @@ pub(crate) fn against_the_others(context: &Context, target: &Target, limit: f64)
             sums[*i].1 += 1.0;
         }
     }
+    sums
+}
+
+/// The channel that a difference target holds against the others.
+fn own_channel(target: &Target) -> &'static str {
+    DIFFERENCES.iter().find(|d| d.1 == target.name).map_or("", |d| d.0)
+}
+
+/// What a channel departs from the mean of the other channels by, as a share of it, on the rows of [`readings`] whose speed changed by less
+/// than a share, and what lateness could explain.
+pub(crate) fn against_the_others(context: &Context, target: &Target, limit: f64) -> Vec<(f64, f64)> {
+    let sums = of_the_others(context, target);
     let of = |r: Reading| {
         let (sum, n) = sums[r.row];
         let departure = if n > 0.0 && sum > 0.0 { r.share * context.rpm[r.row] * n / sum - 1.0 } else { r.share - 1.0 };
@@ -242,9 +254,26 @@ pub(crate) fn against_the_others(context: &Context, target: &Target, limit: f64)
     readings(context, target).filter(|r| r.change < limit).map(of).collect()
 }
 
+/// What the channel's readings depart from the other channels by that were set aside because they are too low (`sign` -1) or too high (+1), as a share
+/// of the speed. A reading of next to nothing is no pulse too few: the sensor saw nothing.
+fn set_aside(context: &Context, target: &Target, sign: f64) -> Vec<f64> {
+    let (own, sums) = (own_channel(target), of_the_others(context, target));
+    let struck = context.set_aside.iter().filter(|a| a.channel == own && !a.recurs && !a.silent && !a.stuck);
+    let each = struck.filter(|a| sign * (a.value - a.expected) > 0.0).flat_map(|a| a.span().zip(&a.readings));
+    each.filter_map(|(row, reading)| {
+        let (sum, n) = *sums.get(row)?;
+        (n > 0.0 && sum > 0.0).then(|| reading * n / sum).filter(|share| *share > NOTHING).map(|share| share - 1.0)
+    })
+    .collect()
+}
+
+/// Share of the speed below which a reading is that of a sensor that sees nothing.
+const NOTHING: f64 = 0.05;
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::{Column, Log};
 
     /// Four readings too low in a thousand: by chance they stand alone, and in a row they are a drop-out. Too many pulses may stand in a row.
     #[test]
@@ -262,5 +291,28 @@ mod tests {
             let n = count as f64;
             assert!((n * (1.0 + 1.96 * relative_error_of_a_count(count)) - upper).abs() < 0.02, "{count}");
         }
+    }
+
+    /// Three sensors, of which one loses a quarter in every twentieth reading, and in ten more in a row: what was set aside counts with the rest.
+    #[test]
+    fn readings_set_aside_count_with_the_rest() {
+        let rows = 2000;
+        let jitter = |i: usize, k: f64| 1.0 + 2e-4 * (k * (i * i) as f64).sin();
+        let is_low = |i: usize| i % 20 == 7 || (100..110).contains(&i);
+        let column = |name: &str, k: f64| Column {
+            name: name.into(),
+            values: (0..rows).map(|i| 4000.0 * jitter(i, k) * if name == "rpm_opto" && is_low(i) { 0.75 } else { 1.0 }).collect(),
+        };
+        let columns = vec![column("rpm_beam", 0.7), column("rpm_opto", 1.7), column("rpm_hall", 2.7)];
+        let log = Log { t: (0..rows).map(|i| 0.1 * i as f64).collect(), columns, ..Log::default() };
+        let context = Context::new(&log, None);
+        let of_it = context.set_aside.iter().filter(|a| a.channel == "rpm_opto" && !a.recurs);
+        assert!(of_it.map(|a| a.rows).sum::<usize>() > 5, "{:?}", context.set_aside);
+        let instances = pulse_instances(&context, -1.0);
+        let opto = instances.iter().find(|i| i.channels.iter().any(|c| c == "rpm_opto")).expect("it is compared");
+        let target = difference(&context, opto).expect("a difference");
+        let truth = 0.25 * (0..rows).filter(|i| is_low(*i)).count() as f64 / rows as f64;
+        let told = pulse_probability(&context, target, -1.0).value;
+        assert!((told / truth - 1.0).abs() < 0.02, "{told}, {truth}");
     }
 }

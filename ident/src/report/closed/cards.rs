@@ -203,9 +203,6 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     if let Some(open) = open_sizes(e) {
         let _ = writeln!(html, "<p class=\"soft\">{}</p>", escape(&open));
     }
-    if let Some(said) = with_those_set_aside(page, k) {
-        let _ = writeln!(html, "<p class=\"warn\">{}</p>", escape(&said));
-    }
     sheet.html_part(&html);
     let figures: Vec<Figure> = page.cards.get(k).cloned().unwrap_or_default();
     sheet.html_part("<div class=\"split\">\n");
@@ -228,20 +225,6 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
         let _ = writeln!(html, "<p><b>To settle it:</b> {}</p>", how);
     }
     sheet.html_part(&format!("{html}</div></div></article>\n"));
-}
-
-/// What a sensor loses with the readings counted in that were set aside, and without them.
-fn with_those_set_aside(page: &Page<'_>, k: usize) -> Option<String> {
-    let (v, e) = (page.verdict, page.verdict.effects.get(k)?);
-    let whole = (*page.counted.get(k)?)?;
-    let per_cent = |share: f64| digits(100.0 * share, 10.0 * share);
-    let fitted = e.parameter("probability")?.value;
-    Some(format!(
-        "{} of its readings were set aside because they are too low. Counted in with them it misses {} % of its pulses, without them {} %.",
-        lost::readings(v, e),
-        per_cent(whole),
-        per_cent(fitted),
-    ))
 }
 
 /// The title where a rival is likelier than the name that the model holds: both, the likelier first.

@@ -24,10 +24,10 @@ fn way(e: &EffectEntry) -> Option<f64> {
 }
 
 /// The stretches of an effect's sensor that were set aside and are off the way in which the effect moves a reading.
-pub(crate) fn struck<'v>(v: &'v Verdict, e: &'v EffectEntry) -> impl Iterator<Item = &'v SetAside> {
+fn struck<'v>(v: &'v Verdict, e: &'v EffectEntry) -> impl Iterator<Item = &'v SetAside> {
     let sign = way(e).unwrap_or(0.0);
     let of_it = move |a: &&SetAside| e.channels.first() == Some(&a.channel) && sign * (a.value - a.expected) > 0.0;
-    v.set_aside.iter().filter(of_it).filter(|a| !a.recurs && !a.silent)
+    v.set_aside.iter().filter(of_it).filter(|a| !a.recurs && !a.silent && !a.stuck)
 }
 
 /// How many readings those are.
@@ -40,8 +40,8 @@ pub(super) fn beside(v: &Verdict, e: &EffectEntry) -> String {
     let too = if way(e) == Some(1.0) { "high" } else { "low" };
     match readings(v, e) {
         0 => String::new(),
-        1 => format!(", beside 1 reading set aside as too {too}"),
-        n => format!(", beside {n} readings set aside as too {too}"),
+        1 => format!(", counting 1 reading set aside as too {too}"),
+        n => format!(", counting {n} readings set aside as too {too}"),
     }
 }
 
@@ -98,7 +98,8 @@ mod tests {
     fn aside(channel: &str, rows: usize, value: f64) -> SetAside {
         let (channel, expected) = (channel.to_owned(), 4000.0);
         let [recurs, silent, stuck, timeless] = [false; 4];
-        SetAside { channel, row: 7, rows, t_s: 0.7, until_s: 0.8, value, expected, recurs, silent, stuck, timeless }
+        let readings = vec![value; rows];
+        SetAside { channel, row: 7, rows, t_s: 0.7, until_s: 0.8, value, expected, recurs, silent, stuck, timeless, readings }
     }
 
     fn faulty() -> Verdict {

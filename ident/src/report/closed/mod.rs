@@ -28,7 +28,6 @@ pub(crate) use evidence::{
 };
 pub(crate) use fold::{aside, candidates};
 pub(crate) use look::{LOOK, SCRIPT};
-pub(crate) use lost::struck;
 pub(crate) use page::{Page, Reading, begin};
 pub use provenance::{Hidden, Origin};
 pub(crate) use sentence::loudest;
@@ -36,6 +35,6 @@ pub use sentence::sentence;
 pub(crate) use state::bars;
 pub use terminal::{WIDEST, terminal, wrapped};
 pub use vocabulary::Vocabulary;
-pub(crate) use vocabulary::{ALL_ROWS, bare};
 #[cfg(test)]
-pub(crate) use vocabulary::{bare_entry, bare_verdict};
+pub(crate) use vocabulary::bare_entry;
+pub(crate) use vocabulary::{ALL_ROWS, bare};

@@ -35,8 +35,6 @@ pub(crate) struct Page<'p> {
     pub(crate) left: Vec<Figure>,
     /// Single readings that were set apart.
     pub(crate) readings: Vec<Reading>,
-    /// Of each effect whose readings were set aside in part: its probability with all of them counted; nothing of any other.
-    pub(crate) counted: Vec<Option<f64>>,
     /// Of several runs: each parameter run by run, the head first.
     pub(crate) parameters: Vec<Vec<String>>,
     /// Figures of several speeds together, under a heading of their own.
