@@ -10,8 +10,8 @@
 //! | `sh refused` | run; must end with status 1 |
 //! | `sh data` | run where `$QUADRIG_DATA` (or `../shared/data`) is there, else only parsed |
 //! | `sh board` | run, a virtual board with an assistant in the place of the real one; `rig.toml` is a preset where the page wrote none |
-//! | `sh files` | run; the files that it reads and the page did not make are a simulated run |
-//! | `sh long`, `sh hardware` | only parsed, see [`parse`]: takes minutes, needs hands at a real board, a second terminal, a cluster or files of other programs |
+//! | `sh files` | run; the files that it reads and the page did not make are a simulated run, or a flight and its ULog |
+//! | `sh long`, `sh hardware` | only parsed, see [`parse`]: takes minutes, needs hands at a real board, a second terminal or a cluster |
 //! | `text says` | its lines stand in this order in what the last block wrote |
 //! | `toml FILE`, `csv FILE` | written to that file |
 //!
@@ -22,7 +22,10 @@
 //! Reference: `docs/SUMMARY.md`; CommonMark, fenced code blocks.
 #![cfg(unix)]
 
+use ident::log::{Column, flight_log};
 use quadrig_tests::book::{Block, Page, blocks, pages};
+use quadrig_tests::flights::scenario::{CLEAN, Scenario};
+use quadrig_tests::recorders::ulog;
 use quadrig_tests::{data, quadrig, root};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -105,6 +108,13 @@ const PORTS: [&str; 2] = ["--port /dev/ttyUSB0", "--port PORT"];
 const VIRTUAL: &str = "--port sim --speed 0 --assist";
 /// Names under which pages speak of a log that the reader has.
 const GIVEN: [&str; 4] = ["FILE", "FOLDER/run.csv", "healthy.csv", "today.csv"];
+/// A flight controller's recording, and another flight of the same vehicle.
+const FLIGHTS: [&str; 2] = ["LOG.ulg", "other.csv"];
+/// A verdict with an open question, and what would settle it.
+const OPEN: (&str, &str) = (
+    "out/verdict.json",
+    r#"{"format": "quadrig-verdict 2", "next_experiment": {"why": "a hold", "schedule": [{"pulse_us": 1300, "hold_s": 3}]}}"#,
+);
 
 /// The script for a virtual board.
 fn at_a_virtual_board(clone: &Clone, script: &str) -> String {
@@ -112,11 +122,19 @@ fn at_a_virtual_board(clone: &Clone, script: &str) -> String {
     if !rig.exists() {
         std::fs::copy(root().join("examples/rig/thesis.toml"), rig).unwrap();
     }
+    let verdict = clone.folder.path().join(OPEN.0);
+    if script.contains(OPEN.0) && !verdict.exists() {
+        std::fs::create_dir_all(verdict.parent().unwrap()).unwrap();
+        std::fs::write(verdict, OPEN.1).unwrap();
+    }
     PORTS.iter().fold(script.to_owned(), |script, port| script.replace(port, VIRTUAL))
 }
 
 /// Lays the logs there that a reader of the page has.
 fn give(clone: &Clone, script: &str) {
+    if FLIGHTS.iter().any(|name| script.contains(name)) {
+        give_flights(clone.folder.path());
+    }
     let scenario = "rest_s = 2\nschedule = { kind = \"up_down\", step_us = 200, hold_s = 4, top_us = 1800 }\n";
     let at = clone.folder.path();
     std::fs::write(at.join("given.toml"), scenario).unwrap();
@@ -125,6 +143,19 @@ fn give(clone: &Clone, script: &str) {
         let output = clone.shell(&format!("quadrig --quiet sim given.toml -o {name}"), None);
         assert!(output.status.success(), "{}", said(&output));
     }
+}
+
+/// Two flights of a vehicle of the blind generator: the first as PX4 would have recorded it, the second as a log.
+fn give_flights(at: &Path) {
+    let vehicle = Scenario::new(CLEAN + 2);
+    let mut log = flight_log::parse("flight.csv", vehicle.log(0).as_bytes()).unwrap_or_else(|e| panic!("{e}"));
+    let current = Column { name: "current_a".into(), values: vec![3.0; log.len()] };
+    if log.column(&current.name).is_none() {
+        log.columns.push(current);
+    }
+    let places: Vec<[f64; 3]> = vehicle.vehicle.hubs.iter().map(|hub| [hub.x, hub.y, hub.turns]).collect();
+    std::fs::write(at.join(FLIGHTS[0]), ulog(&log, &places)).unwrap();
+    std::fs::write(at.join(FLIGHTS[1]), vehicle.log(1)).unwrap();
 }
 
 /// Both streams of what was said.
@@ -314,6 +345,8 @@ fn what_is_wrong_on_a_page_is_told() {
     assert_eq!(told("```sh hardware\nquadrig log --port PORT -o run.csv\ncargo xtask image # a comment\n```\n"), Ok([0, 2, 0]));
     assert_eq!(told("```sh board\nquadrig rig --port /dev/ttyUSB0 configure rig.toml\n```\n"), Ok([1, 0, 0]));
     assert_eq!(told("```sh files\nquadrig --quiet identify healthy.csv -o m.toml\n```\n"), Ok([1, 0, 0]));
+    assert_eq!(told("```sh files\nquadrig --quiet import LOG.ulg -o flight.csv --meta mass_kg=0.9\n```\n"), Ok([1, 0, 0]));
+    assert_eq!(told("```sh board\nquadrig --quiet rig --port PORT run --next out/verdict.json -o n.csv\n```\n"), Ok([1, 0, 0]));
     for wrong in [
         "```sh board\nquadrig rig --port /dev/ttyUSB0 configure gone.toml\n```\n",
         "```sh\nquadrig close-loop gone.csv\n```\n",
