@@ -71,9 +71,11 @@ pub(crate) fn revise(
         // the ranking asks first what the noise's own colour speaks for: more evidence may stand behind
         let better = ranked.iter().position(|c| clearly(c) && predicts_as_well(context, declared, folds, &c.fit, &best.fit));
         let Some(winner) = better.or(own).filter(|w| ranked[*w].evidence > NEEDED_EVIDENCE) else {
+            let without = Candidate { evidence: evidence_over(context, &base, start), fit: base };
             // where it no longer applies for its own place, the others must do without it
-            if own.is_some() || predicts_as_well(context, declared, folds, &base, &best.fit) {
-                *best = Candidate { evidence: evidence_over(context, &base, start), fit: base };
+            let is_needed = || best.evidence > without.evidence + NEEDED_EVIDENCE;
+            if own.is_some() || !is_needed() && predicts_as_well(context, declared, folds, &without.fit, &best.fit) {
+                *best = without;
                 rounds.remove(k);
                 settled.remove(k);
                 settled.fill(false);
