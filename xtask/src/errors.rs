@@ -1,7 +1,7 @@
 //! `cargo xtask errors`: docs/errors.md, every refusal of the command line, from the source that says it.
 //!
 //! What it is: the texts that hold "expected", and the arguments of every `refuse(...)`, gathered area by area; what stands in braces in the source is
-//! a place for a value (`...`). For the board's refusals what to do is written here.
+//! a place for a value: its name in the source in capitals, or `...`. For the board's refusals what to do is written here.
 //!
 //! What can go wrong: an area without a refusal, a reason of the board without advice; the page that is not the source's: a test fails.
 //!
@@ -139,8 +139,8 @@ const HEAD: &str = "\
 # Refusals
 
 Written by `cargo xtask errors` from the source. A refusal is one line on standard error: `quadrig: FILE:LINE: what is there; expected what should be`, with what
-to try where it is not plain; exit status 1. Nothing is written then, and what was there stays. `...` stands for a name, a place or a value. Wrong usage (an option
-that is none, a word that an option does not take) is status 2, and `--help` says what there is.
+to try where it is not plain; exit status 1. Nothing is written then, and what was there stays. A word in capitals, or `...`, stands for a name, a
+place or a value. Wrong usage (an option that is none, a word that an option does not take) is status 2, and `--help` says what there is.
 ";
 
 /// Calls that are refused, each with what is printed: its name, the call, the line. The table of `tests/tests/refusals.rs` holds them to it.
@@ -177,7 +177,8 @@ fn page(root: &Path) -> Result<String, String> {
         for (found, expected) in &spoken {
             let _ = writeln!(out, "| {} | {} |", said(found, expected).unwrap_or_default(), cell(expected));
         }
-        let wanted: BTreeSet<String> = echoed.iter().map(|(_, expected)| cell(expected)).filter(|e| e != UNKNOWN).collect();
+        let wanted: BTreeSet<String> =
+            echoed.iter().map(|(_, expected)| cell(expected)).filter(|e| e.contains(char::is_lowercase)).collect();
         if !wanted.is_empty() {
             out += if spoken.is_empty() { ECHOED_ALONE } else { ECHOED };
             wanted.iter().for_each(|expected| out += &format!("- {expected}\n"));
@@ -207,16 +208,16 @@ fn examples(root: &Path) -> Result<String, String> {
 /// What the page says of what is found: its words; where the source holds none, what stands in their place. Nothing where a refusal says what
 /// it found as it stands there.
 fn said(found: &str, expected: &str) -> Option<String> {
-    match found {
+    match &*nameless(found) {
         // a key, a column or an option alone
-        found if found.contains(char::is_alphabetic) && !found.contains([' ', ':', '"']) => {
-            Some(format!("the value of `{found}`"))
+        bare if bare.contains(char::is_alphabetic) && !bare.contains([' ', ':', '"']) => {
+            Some(format!("the value of `{}`", cell(found)))
         }
-        found if found.contains(char::is_alphabetic) => Some(cell(found)),
+        bare if bare.contains(char::is_alphabetic) => Some(cell(found)),
         // it is told at the end, behind the name of its key, option or field
         "" | "..." if expected.contains("found ") => Some("the name of what holds the value".to_owned()),
         "... ..." => Some("the option and its value".to_owned()),
-        found if found.contains('\'') => Some(format!("the value: {}", cell(found))),
+        bare if bare.contains('\'') => Some(format!("the value: {}", cell(found))),
         _ => None,
     }
 }
@@ -286,7 +287,7 @@ fn refusals(source: &str) -> Vec<(String, String)> {
             .filter(|l| !is_column(l))
             .filter(|l| l.start > at && l.start < end)
             .map(|l| l.text.as_str())
-            .filter(|t| t.len() > 2)
+            .filter(|t| nameless(t).len() > 2)
             .collect();
         let ranges = arguments(code, at + call.len(), end);
         let is_found = |text: &str| {
@@ -312,8 +313,8 @@ fn refusals(source: &str) -> Vec<(String, String)> {
                 out.push((found.to_owned(), String::new()));
             }
             [expected] if !expected.contains("expected ") => {
-                let begins = told.first().filter(|_| expected.starts_with("...")).map_or_else(String::new, String::clone);
-                out.push((found, format!("{begins}{}", if begins.is_empty() { expected } else { &expected[3..] })));
+                let rest = told.first().and_then(|begins| Some((begins, past_value(expected)?)));
+                out.push((found, rest.map_or_else(|| expected.to_owned(), |(begins, rest)| format!("{begins}{rest}"))));
             }
             [found, ref expected @ ..] if !found.contains("expected ") && !expected.is_empty() => {
                 out.push((found.to_owned(), expected.join(" ")));
@@ -342,8 +343,9 @@ fn doubts(code: &str, literals: &[Literal]) -> Vec<String> {
         if !code[what].trim_start().starts_with("said(") {
             return text;
         }
-        let begins = bound_to(code, literals, at, "said").first()?.trim_end_matches("...").to_owned();
-        Some(begins + &text.unwrap_or_else(|| "...".to_owned()))
+        let all = bound_to(code, literals, at, "said");
+        let begins = &all.first()?[..all.first()?.rfind(UNKNOWN)?];
+        Some(begins.to_owned() + &text.unwrap_or_else(|| UNKNOWN.to_owned()))
     });
     found.collect()
 }
@@ -379,7 +381,7 @@ fn used_in(code: &str, literals: &[Literal], named: &Literal) -> Option<String> 
         .iter()
         .find(|l| l.start > named.start && code[l.start + 1..ending(code.as_bytes(), l.start + 1)].contains(&mark))?;
     let raw = &code[user.start + 1..ending(code.as_bytes(), user.start + 1)];
-    let said = plain(raw.split(&mark).next()?);
+    let said = plain(raw.split(&mark).next()?, &[]);
     let said = said.trim_end_matches([' ', ';', ':']).to_owned();
     said.chars().any(char::is_alphabetic).then_some(said)
 }
@@ -403,7 +405,7 @@ fn bound_to(code: &str, literals: &[Literal], at: usize, name: &str) -> Vec<Stri
         before.rfind("let ").is_none_or(|k| before[k..].contains(';'))
     };
     let least = if name == "found" { 0 } else { 12 };
-    let inside = literals.iter().filter(|l| l.start > from && l.start < end && l.text.len() > least);
+    let inside = literals.iter().filter(|l| l.start > from && l.start < end && nameless(&l.text).len() > least);
     inside.filter(is_own).map(|l| l.text.clone()).collect()
 }
 
@@ -413,7 +415,7 @@ struct Literal {
     text: String,
 }
 
-/// The texts of a source, values in braces as three dots; comments hold none.
+/// The texts of a source, values in braces as three dots with their names; comments hold none.
 fn literals(code: &str) -> Vec<Literal> {
     let bytes = code.as_bytes();
     let (mut out, mut at) = (Vec::new(), 0);
@@ -423,7 +425,7 @@ fn literals(code: &str) -> Vec<Literal> {
             b'\'' => at += character(bytes, at),
             b'"' => {
                 let end = ending(bytes, at + 1);
-                out.push(Literal { start: at, text: plain(&code[at + 1..end]) });
+                out.push(Literal { start: at, text: plain(&code[at + 1..end], &values_behind(code, end + 1)) });
                 at = end + 1;
             }
             _ => at += 1,
@@ -465,27 +467,79 @@ fn closing(code: &str, from: usize) -> usize {
     code.len()
 }
 
-/// A text as it is printed, with dots for what is filled in.
-fn plain(literal: &str) -> String {
+/// What stands around the name of a value, behind its dots.
+const NAMED: [char; 2] = ['\u{1}', '\u{2}'];
+/// Names of values that say more to a reader under another one.
+const READ: [(&str, &str); 7] =
+    [("e", "REASON"), ("why", "REASON"), ("error", "REASON"), ("path", "FILE"), ("n", "N"), ("at", "PLACE"), ("short", "VALUE")];
+
+/// The arguments behind a text in its macro.
+fn values_behind(code: &str, from: usize) -> Vec<&str> {
+    let Some(begin) = code[from..].starts_with(',').then_some(from + 1) else { return Vec::new() };
+    let end = closing(code, begin);
+    let is_short = end - begin < 400; // what never closes is no macro's
+    if is_short { code[begin..end].split(',').map(str::trim).collect() } else { Vec::new() }
+}
+
+/// The name of a value in capitals, from what stands in the source for it: a variable, a field, or what a method is asked of.
+fn name_of(value: &str) -> Option<String> {
+    let call = value.trim_start_matches(['&', '*']);
+    let (path, is_call) = call.split_once('(').map_or((call, false), |(path, _)| (path, true));
+    let is_name = |c: char| c.is_ascii_lowercase() || c == '_' || c == '.' || c.is_ascii_digit();
+    if path.is_empty() || !path.chars().all(is_name) || path.starts_with(|c: char| c.is_ascii_digit()) {
+        return None;
+    }
+    let mut parts = path.rsplit('.').skip(usize::from(is_call && path.contains('.'))).filter(|p| *p != "self");
+    let name = parts.next().filter(|p| !p.starts_with(|c: char| c.is_ascii_digit()))?;
+    let read = READ.iter().find(|(said, _)| *said == name).map(|(_, read)| (*read).to_owned());
+    read.or_else(|| (name.len() > 1).then(|| name.to_uppercase()))
+}
+
+/// A text as it is printed, with dots for what is filled in and the name of what that is; `values` are those of empty braces.
+fn plain(literal: &str, values: &[&str]) -> String {
     let text = literal.replace("\\\"", "\"").replace("\\n", " ").replace("\\t", " ").replace("{{", "(").replace("}}", ")");
-    let mut out = String::new();
-    let mut depth = 0;
+    let (mut out, mut inside, mut values) = (String::new(), None::<String>, values.iter());
     for c in text.chars() {
-        match c {
-            '{' => depth += 1,
-            '}' if depth > 0 => {
-                depth -= 1;
-                out.push_str("...");
+        match (c, inside.as_mut()) {
+            ('{', _) => inside = Some(String::new()),
+            ('}', Some(held)) => {
+                let named = held.split(':').next().unwrap_or_default().to_owned();
+                let value = if named.is_empty() { values.next().copied().unwrap_or_default() } else { &named };
+                // what ends a word is no name: an ending, or a note behind it
+                let ends_word = out.ends_with(char::is_alphanumeric);
+                out.push_str(UNKNOWN);
+                if let Some(name) = name_of(value).filter(|_| !ends_word) {
+                    out.extend([NAMED[0]].into_iter().chain(name.chars()).chain([NAMED[1]]));
+                }
+                inside = None;
             }
-            c if depth == 0 => out.push(c),
-            _ => {}
+            (c, Some(held)) => held.push(c),
+            (c, None) => out.push(c),
         }
     }
     out.split_whitespace().filter(|word| *word != "\\").collect::<Vec<_>>().join(" ") + if out.ends_with(' ') { " " } else { "" }
 }
 
+/// A text with dots for its values and no names.
+fn nameless(text: &str) -> String {
+    let mut parts = text.split(NAMED[0]);
+    let first = parts.next().unwrap_or_default().to_owned();
+    first + &parts.filter_map(|part| part.split_once(NAMED[1])).map(|(_, rest)| rest).collect::<String>()
+}
+
+/// A text with the names of its values.
+fn named(text: &str) -> String {
+    text.replace(&format!("{UNKNOWN}{}", NAMED[0]), "").replace(NAMED[1], "")
+}
+
+/// What stands behind the value that a text begins with.
+fn past_value(text: &str) -> Option<&str> {
+    let rest = text.strip_prefix(UNKNOWN)?;
+    Some(rest.strip_prefix(NAMED[0]).and_then(|named| named.split_once(NAMED[1])).map_or(rest, |(_, rest)| rest))
+}
+
 fn cell(text: &str) -> String {
-    let text = text.trim().replace('|', "\\|").replace('<', "&lt;");
+    let text = named(text.trim()).replace('|', "\\|").replace('<', "&lt;");
     if text.is_empty() { UNKNOWN.to_owned() } else { text }
 }
 
@@ -520,19 +574,39 @@ mod tests {
             let d = "in a test; expected nothing";
         "#;
         let wanted = [
-            ("...: ... is \"late\"", "seconds: sort ..."),
-            ("...: holds ..., mixed up with these", "a new folder"),
-            ("no effect ...", "one of ..."),
+            ("...: COLUMN is \"late\"", "seconds: sort THEM"),
+            ("FILE: holds NAME, mixed up with these", "a new folder"),
+            ("no effect ...", "one of LIST"),
             ("key start_pulse_us: ...", "a finite number, in us"),
-            ("key ...: ...", "one of ..."),
-            ("... fields", "6 as in the header"),
-            ("... of ... rows would be dropped: ...", "a clock that moves on"),
-            ("by its name a ...", ""),
-            ("... N at ... rev/min: grams?", "what a rig can do, in the unit of ..."),
-            ("... V: hundredths of a volt?", "what a rig can do, in the unit of ..."),
+            ("key PLACE.KEY: ...", "one of KNOWN"),
+            ("N fields", "6 as in the header"),
+            ("N of ROWS rows would be dropped: LIKELY", "a clock that moves on"),
+            ("by its name a NAME", ""),
+            ("THRUST N at N rev/min: grams?", "what a rig can do, in the unit of COLUMN"),
+            ("TOP V: hundredths of a volt?", "what a rig can do, in the unit of COLUMN"),
         ];
         let wanted: Vec<(String, String)> = wanted.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect();
-        assert_eq!(refusals(source), wanted);
+        let told: Vec<(String, String)> = refusals(source).iter().map(|(a, b)| (named(a), named(b))).collect();
+        assert_eq!(told, wanted);
+    }
+
+    #[test]
+    fn a_value_is_told_by_its_name() {
+        for (value, name) in [
+            ("self.rows", "ROWS"),
+            ("path.display()", "FILE"),
+            ("&known.join(\", \")", "KNOWN"),
+            ("e", "REASON"),
+            ("held", "HELD"),
+        ] {
+            assert_eq!(name_of(value).as_deref(), Some(name), "{value}");
+        }
+        for value in ["0", "x", "if far { 1 } else { 2 }", "\"text\"", "a + b", "self.0"] {
+            assert_eq!(name_of(value), None, "{value}");
+        }
+        let text = plain("{} of {rows} rows: {0}", &["self.count"]);
+        assert_eq!((named(&text).as_str(), nameless(&text).as_str()), ("COUNT of ROWS rows: ...", "... of ... rows: ..."));
+        assert_eq!(past_value(&text), Some(" of ...\u{1}ROWS\u{2} rows: ..."));
     }
 
     #[test]
