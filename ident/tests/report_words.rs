@@ -870,6 +870,7 @@ fn missing_pulses() -> Verdict {
         silent: false,
         stuck: false,
         timeless: false,
+        readings: vec![1642.17; rows],
     };
     v.set_aside = vec![aside(4), aside(3)];
     v
@@ -880,7 +881,7 @@ fn missing_pulses() -> Verdict {
 fn what_was_set_aside_is_told_with_the_fault() {
     let v = missing_pulses();
     let said = sentence(&v, Vocabulary::RIG, false);
-    assert!(said.contains("misses 1.2 % of its pulses, beside 7 readings set aside as too low."), "{said}");
+    assert!(said.contains("misses 1.2 % of its pulses, counting 7 readings set aside as too low."), "{said}");
     let text = terminal(&v, Vocabulary::RIG, false);
     let row = text.lines().find(|l| l.starts_with("speed (optical)")).unwrap_or_default();
     assert!(row.ends_with("fault stays") && row.contains("0.550 rev/min"), "{row}");
