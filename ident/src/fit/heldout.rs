@@ -7,7 +7,7 @@
 
 use crate::channel::{Context, Target};
 use crate::effects::placed::Placed;
-use crate::fit::search::{refine, refine_group};
+use crate::fit::search::{refine, refine_group, unfelt_stay};
 use crate::fit::{Designs, Fit, Rows};
 use crate::model::Declared;
 
@@ -126,6 +126,7 @@ pub fn errors_around_newest(
     for out in folds {
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
         let placed = refine_group(context, declared, &fit.placed, &[others.len()], Rows::Where(&keep), EVALUATIONS);
+        let placed = unfelt_stay(context, declared, &fit.placed, placed, &keep);
         let (mut with, mut without) = (Designs::new(context, declared, &placed), Designs::new(context, declared, others));
         let targets = context.targets.iter().zip(&mut sums).enumerate();
         for (k, (target, sums)) in targets.filter(|(_, (t, _))| newest.instance.touches(t.name)) {

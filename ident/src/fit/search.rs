@@ -198,11 +198,7 @@ pub(crate) fn refine_group(
         let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
         let widths = free.iter().map(|i| (start[*i].abs(), ranges[*i].1 - ranges[*i].0));
         let steps: Vec<f64> = widths.map(|(at, width)| (0.15 * at).max(0.01 * width).min(0.2 * width)).collect();
-        let mut best = nelder_mead(&cost, &x0, &steps, evaluations);
-        if matches!(rows, Rows::Where(_)) {
-            unfelt(&cost, &x0, &mut best);
-        }
-        let best = with_shapes(placed, &inside(&best));
+        let best = with_shapes(placed, &inside(&nelder_mead(&cost, &x0, &steps, evaluations)));
         group.iter().map(|k| best[*k].shape.clone()).collect()
     });
     let mut out = placed.to_vec();
@@ -210,15 +206,32 @@ pub(crate) fn refine_group(
     out
 }
 
-/// Shapes that the rows do not feel stay where they were: an instant within a stretch that is left out costs the rest nothing, wherever a simplex
-/// has carried it.
-fn unfelt(cost: &dyn Fn(&[f64]) -> f64, from: &[f64], best: &mut [f64]) {
-    let mut least = cost(best);
-    for i in 0..best.len() {
-        let found = std::mem::replace(&mut best[i], from[i]);
-        let back = cost(best);
-        if back <= least { least = back } else { best[i] = found }
+/// Share of a likelihood by which the order of its sums alone may move it: a million sums, each rounded to the 16th digit.
+const ROUNDED: f64 = 1e-10;
+
+/// The hypothesis with those shapes of its newest effect as they were in `from` that the kept rows do not feel: an instant within a stretch that is
+/// left out costs the rest nothing, wherever a simplex has carried it.
+#[must_use]
+pub(crate) fn unfelt_stay(
+    context: &Context,
+    declared: Declared<'_>,
+    from: &[Placed],
+    mut refined: Vec<Placed>,
+    keep: &[bool],
+) -> Vec<Placed> {
+    let Some(k) = refined.len().checked_sub(1) else { return refined };
+    let moving = touched_by_shapes(from, &[k]);
+    let scattering = refined.iter().any(|p| p.effect.scatters());
+    let taught = Taught::new(context, declared, Rows::Where(keep));
+    let gain = |placed: &[Placed]| taught.loglik(placed, &moving, scattering) + placed[k].prior(context);
+    let most = gain(&refined);
+    for i in 0..refined[k].shape.len() {
+        let found = std::mem::replace(&mut refined[k].shape[i], from[k].shape[i]);
+        if found != from[k].shape[i] && (gain(&refined) - most).abs() > ROUNDED * most.abs() {
+            refined[k].shape[i] = found;
+        }
     }
+    refined
 }
 
 fn touched_by_shapes<'p>(placed: &'p [Placed], group: &[usize]) -> Vec<&'p str> {
@@ -239,22 +252,4 @@ fn with_shapes(placed: &[Placed], full: &[f64]) -> Vec<Placed> {
             Placed { shape, ..p.clone() }
         })
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::unfelt;
-
-    #[test]
-    fn a_shape_that_the_rows_do_not_feel_stays_where_it_was() {
-        // the second is an instant between two rows: any value up to 10 fits as well
-        let cost = |x: &[f64]| (x[0] - 1.0).powi(2) + (x[1] - 10.0).max(0.0);
-        let mut best = [0.9, 7.0];
-        unfelt(&cost, &[0.0, 3.0], &mut best);
-        assert_eq!(best, [0.9, 3.0]);
-        // one that is felt goes where it fits better
-        let mut best = [0.9, 11.0];
-        unfelt(&cost, &[0.0, 12.0], &mut best);
-        assert_eq!(best, [0.9, 11.0]);
-    }
 }
