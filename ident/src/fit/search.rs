@@ -253,3 +253,36 @@ fn with_shapes(placed: &[Placed], full: &[f64]) -> Vec<Placed> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::unfelt_stay;
+    use crate::channel::Context;
+    use crate::effects::placed::Placed;
+    use crate::effects::{Instance, by_id};
+    use crate::log::{Column, Log};
+    use crate::model::Declared;
+
+    /// A zero that jumps at 50 s of 100: an instant between the rows that are left out, 40 s to 60 s, costs the others nothing.
+    #[test]
+    fn an_instant_that_the_kept_rows_do_not_feel_stays_where_it_was() {
+        let t: Vec<f64> = (0..1000).map(|i| 0.1 * f64::from(i)).collect();
+        let column = |name: &str, of: fn(f64) -> f64| Column { name: name.into(), values: t.iter().map(|t| of(*t)).collect() };
+        let columns = vec![
+            column("rpm", |t| 3000.0 + 1000.0 * (0.7 * t).sin()),
+            column("thrust_n", |t| {
+                1e-7 * (3000.0 + 1000.0 * (0.7 * t).sin()).powi(2) + if t < 50.0 { 0.0 } else { 0.3 } + 0.01 * (37.0 * t).sin()
+            }),
+        ];
+        let context = Context::new(&Log { t: t.clone(), columns, ..Log::default() }, Some(1000.0));
+        let at = |t0: f64| {
+            let effect = by_id("tare_shift").expect("in the library");
+            vec![Placed { effect, instance: Instance::new(&["thrust_n"], ""), shape: vec![t0] }]
+        };
+        let keep: Vec<bool> = t.iter().map(|t| !(40.0..60.0).contains(t)).collect();
+        let stays = |found: f64| unfelt_stay(&context, Declared::default(), &at(50.0), at(found), &keep)[0].shape[0];
+        assert_eq!([42.0, 58.0].map(stays), [50.0, 50.0]);
+        // one that they feel stays where it was found
+        assert_eq!([20.0, 80.0].map(stays), [20.0, 80.0]);
+    }
+}
