@@ -384,7 +384,7 @@ fn what_is_computed_beyond_the_run_is_told() {
     for peer in PEERS {
         assert!(!exported(peer, &[]).contains("is computed"), "{peer}: the whole range was measured");
         let said = call(&bench(), &["export", "short.toml", "--to", peer]).succeeded();
-        let told = "measured up to 1800 us, ";
+        let told = "the run ends at 1800 us, ";
         assert!(
             said.out.contains(told) && said.out.contains("beyond is computed") && said.err.contains(told),
             "{peer}: {said:?}"
@@ -396,7 +396,7 @@ fn what_is_computed_beyond_the_run_is_told() {
         ]);
         assert!(!bench().join("x").exists());
         let said = call(&bench(), &["export", "shorter.toml", "--to", peer, "--extrapolate", "-o", "y"]).succeeded();
-        assert!(said.out.contains("measured up to 1400 us, "), "{peer}: {said:?}");
+        assert!(said.out.contains("the run ends at 1400 us, "), "{peer}: {said:?}");
     }
 }
 

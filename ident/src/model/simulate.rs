@@ -21,7 +21,9 @@ pub fn from_command(model: &Model, name: &str, t: &[f64], pulse_us: &[f64], cova
     let mut log = Log { name: name.to_owned(), t: t.to_vec(), ..Log::default() };
     log.columns.push(Column { name: "pulse_us".into(), values: pulse_us.to_vec() });
     for p in model.polynomials.iter().filter(|p| Relation::of(&p.channel, true) != Some(Relation::SpeedDifference)) {
-        log.columns.push(Column { name: p.channel.clone(), values: vec![0.0; t.len()] });
+        // a current at the same power from no voltage at all has no end: the supply starts where no load has it
+        let start = if p.channel == "voltage_v" { p.coefficients.first().copied().unwrap_or(0.0) } else { 0.0 };
+        log.columns.push(Column { name: p.channel.clone(), values: vec![start; t.len()] });
     }
     log.columns.extend(
         covariates.iter().filter(|c| !model.polynomials.iter().any(|p| p.channel == c.name) && c.name != "pulse_us").cloned(),
@@ -54,4 +56,48 @@ pub fn from_command(model: &Model, name: &str, t: &[f64], pulse_us: &[f64], cova
         }
     }
     log
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lead_at_full_load_leaves_the_motor_its_voltage() {
+        let text = r#"
+            format = "quadrig-model 1"
+            source = "lead.csv"
+            start_pulse_us = 1000.0
+            [consensus]
+            channels = ["rpm"]
+            [channel.rpm]
+            c0_rev_per_min = 0.0
+            c1_rev_per_min_per_kus = 19000.0
+            c2_rev_per_min_per_kus2 = 0.0
+            c3_rev_per_min_per_kus3 = 0.0
+            [channel.current_a]
+            c0_a = 0.0
+            c1_a_per_krpm = 0.0
+            c2_a_per_krpm2 = 0.0
+            c3_a_per_krpm3 = 0.005
+            [channel.voltage_v]
+            c0_v = 16.0
+            [[effect]]
+            id = "supply_sag"
+            form = "same_power"
+            channels = ["voltage_v", "current_a"]
+            scope = "rig"
+            shape = [1.33, 15.8]
+            [effect.amplitude.voltage_v]
+            resistance_ohm = 0.0411
+        "#;
+        let model = Model::parse("m.toml", text).expect("a model");
+        let t: Vec<f64> = (0..200).map(|i| 0.1 * f64::from(i)).collect();
+        let run = from_command(&model, "full", &t, &vec![2000.0; t.len()], &[]);
+        let last = |name: &str| run.column(name).and_then(|v| v.last().copied()).expect("a prediction");
+        let (current, voltage) = (last("current_a"), last("voltage_v"));
+        // of the two states that obey both equations it is the one that a loaded supply goes to
+        assert!((voltage - (16.0 - 0.0411 * current)).abs() < 1e-3, "{voltage} V at {current} A");
+        assert!((30.0..50.0).contains(&current), "{current} A at {voltage} V");
+    }
 }

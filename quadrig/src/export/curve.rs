@@ -135,7 +135,7 @@ impl Powerplant {
         let full = self.full_n();
         match (self.ends_at(), self.measured) {
             (Some((us, n)), _) => {
-                Some(format!("measured up to {us:.0} us, {n:.2} N; beyond is computed, {full:.2} N at 2000 us"))
+                Some(format!("the run ends at {us:.0} us, {n:.2} N by the model; beyond is computed, {full:.2} N at 2000 us"))
             }
             (None, None) => Some("how far its run went the model does not tell: the upper end may be computed".to_owned()),
             _ => None,
@@ -173,10 +173,17 @@ impl Powerplant {
         100.0 * self.points.iter().map(off).fold(0.0, f64::max)
     }
 
-    /// Thrust over the square of the angular speed, N.s^2, and torque over thrust, m, both at full throttle.
+    /// Thrust for the square of the angular speed, N.s^2, and torque for the thrust, m: least squares over the states that the run went through,
+    /// as one constant has to do for all of them.
     pub(super) fn quotients(&self) -> (f64, Option<f64>) {
-        let Some(top) = self.points.last() else { return (0.0, None) };
-        (top.thrust_n / (top.rpm * TAU / 60.0).powi(2), top.torque_nm.map(|q| q / top.thrust_n))
+        let square = |p: &Point| (p.rpm * TAU / 60.0).powi(2);
+        let seen = || self.points.iter().filter(|p| p.signal <= self.measured.unwrap_or(1.0));
+        let for_square = |of: &dyn Fn(&Point) -> Option<f64>| {
+            let top: Option<f64> = seen().map(|p| Some(of(p)? * square(p))).sum();
+            top.map(|top| top / seen().map(|p| square(p).powi(2)).sum::<f64>())
+        };
+        let thrust = for_square(&|p| Some(p.thrust_n)).unwrap_or(0.0);
+        (thrust, for_square(&|p| p.torque_nm).map(|torque| torque / thrust))
     }
 
     /// Supply at full throttle, V.

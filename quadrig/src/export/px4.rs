@@ -44,7 +44,7 @@ pub(super) fn text(plant: &Powerplant, rotors: u32, battery: Battery) -> String 
     ));
     let moment = arm.map_or_else(|| "not known".to_owned(), |arm| format!("{arm:.6}"));
     head.push(format!(
-        "Gazebo MulticopterMotorModel: motorConstant {k_thrust:.6e}, momentConstant {moment}, maxRotVelocity {top_rad_s:.1}{}",
+        "Gazebo MulticopterMotorModel: motorConstant {k_thrust:.6e}, momentConstant {moment} (both least squares over the run's speeds), maxRotVelocity {top_rad_s:.1}{}",
         plant.lag_s.map_or_else(String::new, |lag_s| format!(", timeConstantUp {lag_s:.4}"))
     ));
     let no_moment = arm.is_none().then(|| "CA_ROTORn_KM: the model predicts no torque".to_owned());
