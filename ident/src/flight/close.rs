@@ -391,7 +391,10 @@ impl<'w> Whole<'w> {
                 }
             };
             EffectEntry {
-                kin: Kin::Own,
+                kin: match &self.library.kinds[placed.candidate] {
+                    Behind::Effect(effect, _) if effect.is_of_every_vehicle() => Kin::OfEvery,
+                    _ => Kin::Own,
+                },
                 id: candidate.id.to_owned(),
                 scope,
                 run: None,

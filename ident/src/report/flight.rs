@@ -26,7 +26,6 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     figures: "Figures, bars and cards all show rows that no fit saw.",
     about: effects::about,
     clause: |found| effects::said(found).unwrap_or_else(|| parts::bare(found)),
-    of_every_rig: |found| found.id == "spinup_lag",
     // a curve is seen in its figure
     parameter: |id, name| if id == "unknown" { String::new() } else { parameter(name) },
     by_floors: false,

@@ -22,7 +22,6 @@ pub const VOCABULARY: Vocabulary = Vocabulary {
     figures: parts::ALL_ROWS,
     about: effects::about,
     clause,
-    of_every_rig: |_| false,
     parameter: named,
     by_floors: true,
 };

@@ -161,12 +161,14 @@ pub struct Parameter {
 }
 
 /// Whose an effect is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Kin {
     /// This rig's own.
     #[default]
     Own,
     /// Every rig's: a rotor has inertia and takes time.
+    #[serde(rename = "every_rig")]
     OfEvery,
     /// Every logger's: where in its row a reading lies.
     WithinRow,
@@ -180,7 +182,6 @@ pub struct EffectEntry {
     /// What it belongs to.
     pub scope: Scope,
     /// Whether every rig has the like: it is told apart from what this one has.
-    #[serde(skip)]
     pub kin: Kin,
     /// With several runs: the one that it is of, where it is of one alone.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -125,6 +125,10 @@ pub trait AirframeEffect: Sync {
     fn excludes(&self, _form: &Form) -> Vec<(&'static str, String)> {
         Vec::new()
     }
+    /// Whether every vehicle has it, and what counts is how much.
+    fn is_of_every_vehicle(&self) -> bool {
+        false
+    }
     /// Whether it changes what acts, and with it the columns of others.
     fn alters(&self) -> bool {
         false

@@ -43,6 +43,10 @@ impl AirframeEffect for SpinupLag {
         )
     }
 
+    fn is_of_every_vehicle(&self) -> bool {
+        true
+    }
+
     fn scope(&self, _: &Form) -> Scope {
         Scope::Rig
     }

@@ -13,7 +13,7 @@ use crate::channel::unit_of;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
 use crate::verdict::words::{digits, heading, scaled};
-use crate::verdict::{Kind, Validation, Verdict};
+use crate::verdict::{Kin, Kind, Validation, Verdict};
 
 /// What a page is made of.
 pub(crate) struct Page<'p> {
@@ -84,7 +84,10 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
         sheet.warn(&format!("Left out: {l}."));
     }
     if !page.hero.is_empty() {
+        let of_every = format!("What every {} has, where it shows most", page.words.noun);
         sheet.section(match v.verdict {
+            // that a rotor takes time convinces nobody of anything
+            Kind::Attributed if v.effects.iter().all(|e| e.id == "unknown" || e.kin != Kin::Own) => &of_every,
             Kind::Attributed | Kind::Ambiguous => "The figure that convinces most",
             Kind::Unattributed => "The channel on which most is left",
             Kind::None => "The loudest channel",

@@ -103,7 +103,7 @@ fn floors_removed(v: &Verdict, e: &EffectEntry) -> f64 {
 /// The effects with a name: those of this rig, and those of every rig.
 fn named(verdict: &Verdict, words: Vocabulary) -> (Vec<&EffectEntry>, Vec<&EffectEntry>) {
     let all = order(verdict, words).into_iter().map(|k| &verdict.effects[k]).filter(|e| e.id != "unknown");
-    all.partition(|e| !(words.of_every_rig)(e))
+    all.partition(|e| e.kin == Kin::Own)
 }
 
 fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {

@@ -17,7 +17,7 @@ use crate::channel::unit_of;
 use crate::signal::bad::SetAside;
 use crate::verdict::Scope;
 use crate::verdict::words::{channel, list, plain, probability, signs, upper, upper_bound};
-use crate::verdict::{Alternative, Channel, EffectEntry, Verdict};
+use crate::verdict::{Alternative, Channel, EffectEntry, Kin, Verdict};
 
 /// Columns of the widest line.
 pub const WIDEST: usize = 100;
@@ -43,7 +43,7 @@ pub fn terminal(whole: &Verdict, words: Vocabulary, news: bool) -> String {
     let of = |k: &usize| &verdict.effects[*k];
     let (named, nameless): (Vec<usize>, Vec<usize>) = order(verdict, words).into_iter().partition(|k| of(k).id != "unknown");
     let (readings, named): (Vec<usize>, Vec<usize>) = named.into_iter().partition(|k| of(k).is_of_single_readings());
-    let (own, common): (Vec<usize>, Vec<usize>) = named.into_iter().partition(|k| !(words.of_every_rig)(of(k)));
+    let (own, common): (Vec<usize>, Vec<usize>) = named.into_iter().partition(|k| of(k).kin == Kin::Own);
     let noun = words.noun;
     let [this, every] = [format!("what this {noun} has"), format!("what every {noun} has")];
     for (heading, members) in [(this.as_str(), own), (every.as_str(), common), ("without a name", nameless)] {

@@ -25,8 +25,6 @@ pub struct Vocabulary {
     pub about: fn(&str) -> Option<About>,
     /// What a found effect does.
     pub clause: fn(&EffectEntry) -> Clause,
-    /// Whether every rig has it.
-    pub of_every_rig: fn(&EffectEntry) -> bool,
     /// A parameter in words, by the effect's identifier and its own name; empty where no reader asks for it.
     pub parameter: fn(&str, &str) -> String,
     /// Whether what removes most noise floors is told first, rather than what removes the largest share of its own channel: for a log whose channels
@@ -46,7 +44,6 @@ impl Vocabulary {
         figures: ALL_ROWS,
         about: |id| by_id(id).map(|e| e.about()),
         clause: |found| by_id(&found.id).map_or_else(|| bare(found), |e| e.said(found)),
-        of_every_rig: |found| found.kin != Kin::Own,
         parameter: parameter_of,
         by_floors: false,
     };
