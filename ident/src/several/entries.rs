@@ -157,11 +157,11 @@ pub(super) fn loudest<'a>(after: &'a [Across], channel: &str) -> Option<&'a Acro
     after.iter().filter(|a| a.channel == channel).max_by(|a, b| a.rms.total_cmp(&b.rms))
 }
 
-/// Every channel that is loud on a run after all, once, as large as over all runs, with the run on which it is loudest; and every contrast of a
-/// speed sensor that a run alone left unexplained.
+/// Every channel that is loud on a run after all, once, as large as over all runs, with the run on which it is loudest, and what is left there
+/// goes with; and every contrast of a speed sensor that a run alone left unexplained.
 pub(super) fn unexplained(
     runs: &[Run],
-    looks: &dyn Fn(&Across) -> Option<String>,
+    looks: &dyn Fn(&Across) -> Option<(String, Vec<String>)>,
     after: &[Across],
     channels: &Channels,
 ) -> Vec<Unexplained> {
@@ -172,11 +172,10 @@ pub(super) fn unexplained(
             continue;
         }
         let run = &runs[loudest.run].closed.verdict;
-        let told = run.unexplained.iter().find(|u| u.channel == a.channel);
-        let shape = looks(loudest).map_or_else(String::new, |looks| format!(": {looks}"));
-        let differ = if told.is_some() { "" } else { "; a fit to that run alone removes it, the runs differ" };
+        let alone = run.unexplained.iter().any(|u| u.channel == a.channel);
+        let (shape, depends_on) = looks(loudest).map_or_else(Default::default, |(looks, with)| (format!(": {looks}"), with));
+        let differ = if alone { "" } else { "; a fit to that run alone removes it, the runs differ" };
         let looks_like = format!("loudest on {}{shape}{differ}", run.run);
-        let depends_on = told.map(|t| t.depends_on.clone()).unwrap_or_default();
         let over_floor = whole.after.heldout_rms / whole.noise_floor_rms;
         out.push(Unexplained { channel: a.channel.to_owned(), over_floor, depends_on, looks_like });
     }

@@ -24,7 +24,7 @@ use crate::numeric::parallel::in_parallel;
 use crate::signal::{bad, start};
 use crate::verdict::Verdict;
 use crate::verdict::words::parameter_of;
-use crate::verdict::words::{DISAGREE, OTHERWISE, digits};
+use crate::verdict::words::{DISAGREE, OTHERWISE, digits, scaled};
 
 /// What several runs amount to.
 #[derive(Debug, Clone)]
@@ -199,8 +199,9 @@ fn disagreement(context: &Context, placed: &Placed, shared: &[Estimate], alone: 
     let shared = reported(shared);
     let (name, [least, most]) = scatter::disagreement(&shared, &runs)?;
     let unit = shared.iter().find(|e| e.name == name).map_or("", |e| e.unit.as_str());
+    let (factor, unit) = scaled(least.abs().max(most.abs()), unit);
     let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-    let told = |v: f64| digits(v, 0.005 * v.abs());
+    let told = |v: f64| digits(factor * v, 0.005 * (factor * v).abs());
     let what = parameter_of(placed.effect.id(), &name);
     let together = shared.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.value);
     let how = if (least..=most).contains(&together) { DISAGREE } else { OTHERWISE };
@@ -218,13 +219,22 @@ fn alone(joint: &Joint<'_, '_>, rig: &[Placed], closed: &[&Closed]) -> Vec<Vec<V
         told.iter_mut().filter(|e| !e.se.is_finite()).for_each(|e| e.se = error(run, k, &e.name).unwrap_or(e.se));
         told
     };
+    // from where the run itself found them: from what all share the search may not come away, and no run is a witness of the others' word
+    let own = |run: usize, p: &Placed| closed.get(run)?.diagnosis.best.fit.placed.iter().find(|own| own.is_like(p));
+    let has = |run: usize, p: &Placed| own(run, p).is_some();
+    let found = |run: usize, p: &Placed| Placed {
+        shape: own(run, p).map_or_else(|| p.shape.clone(), |own| own.shape.clone()),
+        ..p.clone()
+    };
     let of_run = |run: usize| {
         let one = joint.only(run);
-        let refined = one.refined_whole(rig, choose::SOUGHT, choose::EVALUATIONS);
+        let begins: Vec<Placed> = rig.iter().map(|p| found(run, p)).collect();
+        let refined = one.refined_whole(&begins, choose::SOUGHT, choose::EVALUATIONS);
         let shared = one.shared(&refined);
         (0..rig.len())
             .map(|k| {
-                if one.tells(run, &rig[k]) {
+                let is_of_others = refined[k].shape == rig[k].shape && !refined[k].shape.is_empty() && !has(run, &rig[k]);
+                if one.tells(run, &rig[k]) && !is_of_others {
                     with_errors(run, k, choose::estimates(&one, &refined, k, &shared))
                 } else {
                     Vec::new()

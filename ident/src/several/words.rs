@@ -9,6 +9,7 @@ use super::Run;
 use super::entries::{alternatives, entry, own_entries, unexplained, unnamed};
 use super::folds::Tenable;
 use super::joint::{Across, Compared, Joint};
+use crate::attribution::depends::goes_with;
 use crate::attribution::rivals::RIVAL;
 use crate::attribution::unexplained::looks_like;
 use crate::channel::{Context, Relation, is_contrast, unit_of};
@@ -60,7 +61,8 @@ pub(super) fn verdict(told: &Told<'_, '_>) -> Verdict {
     let rig: Vec<Placed> = named.iter().map(|n| n.placed.clone()).collect();
     let looks = |a: &Across| {
         let (context, left) = (&contexts[a.run], joint.left(a.run, &rig, a.channel)?);
-        Some(looks_like(context, &context.targets[context.target(a.channel)?], &left))
+        let target = context.target(a.channel)?;
+        Some((looks_like(context, &context.targets[target], &left), goes_with(context, target, &left)))
     };
     let mut unexplained = unexplained(runs, &looks, &after, &channels);
     // what nothing predicts has nothing left over
