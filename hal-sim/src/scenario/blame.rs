@@ -21,6 +21,16 @@ struct Piece {
     is_list: bool,
 }
 
+/// Where the line with an inline table ends that nothing closes: the parser only notices on a later line.
+pub(super) fn open_brace(text: &str, error: &Error) -> Option<usize> {
+    let told = error.span().filter(|_| error.message().contains("inline table"))?;
+    let before = text.get(..told.start)?;
+    let end = before.trim_end().len();
+    let line = before.get(..end)?.rsplit('\n').next()?;
+    let is_open = line.matches('{').count() > line.matches('}').count();
+    (is_open && before.get(end..)?.contains('\n')).then_some(end)
+}
+
 /// Where the refusal belongs, and the key that it is about where that is known.
 pub(super) fn blame<T: DeserializeOwned>(text: &str, error: &Error) -> (usize, Option<String>) {
     let start = error.span().map_or(0, |span| span.start);

@@ -314,6 +314,9 @@ pub(crate) fn parsed<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, 
     }
     let value = toml::from_str(text).map_err(|error| {
         let (byte, key) = blame::blame::<T>(text, &error);
+        if let Some(open) = blame::open_brace(text, &error) {
+            return refused(open, "an inline table that does not end on its line; expected `}`".to_owned());
+        }
         let mut reason = in_words(&error.message().replace('\n', " "), "docs/scenario.md");
         if let Some(key) = key.filter(|key| !reason.contains(&format!("`{key}`"))) {
             reason = format!("{key}: {reason}");
@@ -360,7 +363,19 @@ pub fn in_words(message: &str, page: &str) -> String {
         .replace("invalid type: integer", "a number")
         .replace("invalid type: floating point", "a number")
         .replace("invalid type: boolean", "true or false,");
-    format!("{before}expected {kind}")
+    let meant = meant(&before, kind).map_or_else(String::new, |word| format!("did you mean `{word}`? "));
+    format!("{before}{meant}expected {kind}")
+}
+
+/// Likeness, after Jaro, from which on a word is taken for a mistyped one; clap has the same.
+const ALIKE: f64 = 0.7;
+
+/// Of several words that are expected the one that an unknown key or variant is most like, if it is like one.
+fn meant<'w>(before: &str, expected: &'w str) -> Option<&'w str> {
+    let typed = before.strip_prefix("unknown ")?.split('`').nth(1)?;
+    let words = expected.split('`').skip(1).step_by(2);
+    let like = |word: &&str| strsim::jaro(typed, word);
+    words.filter(|word| like(word) > ALIKE).max_by(|a, b| like(a).total_cmp(&like(b)))
 }
 
 /// Line and column of a byte of `text`, from 1.

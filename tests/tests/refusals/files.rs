@@ -217,7 +217,16 @@ pub(super) fn scenarios() -> Vec<Case> {
     let case = |name, text: &str, said| with(name, "bad.toml", text, SIM, said);
     vec![
         case("no TOML", "seed = \n", &["bad.toml:1:8: "]),
-        case("a key that is none", "seed = 1\nmoter = \"570KV\"\n", &["bad.toml:2:1: unknown field `moter`", "`motor`"]),
+        case(
+            "a key that is none",
+            "seed = 1\nmoter = \"570KV\"\n",
+            &["bad.toml:2:1: unknown field `moter`, did you mean `motor`? expected"],
+        ),
+        case(
+            "a brace that nothing closes",
+            "seed = 1\nschedule = { kind = \"up_down\", step_us = 50, hold_s = 5, top_us = 2000\n\n[[effect]]\nid = \"creep\"\n",
+            &["bad.toml:2:71: an inline table that does not end on its line; expected `}`"],
+        ),
         case("a key twice", "seed = 1\nseed = 2\n", &["bad.toml:2:1: duplicate key"]),
         case("a seed below 0", "\nseed = -1\n", &["bad.toml:2:8: seed: ", "a whole number from 0"]),
         case("a motor that is none", "motor = \"571KV\"\n", &["bad.toml:1:9: motor: ", "570KV"]),
@@ -252,6 +261,11 @@ pub(super) fn scenarios() -> Vec<Case> {
             "a schedule file that is not there",
             "schedule = { kind = \"file\", file = \"nowhere.toml\" }\n",
             &["nowhere.toml: cannot be read"],
+        ),
+        case(
+            "an effect that is mistyped",
+            "seed = 1\n[[effect]]\nid = \"suply_sag\"\n",
+            &["bad.toml:3:6: id: unknown variant `suply_sag`, did you mean `supply_sag`? expected"],
         ),
         case(
             "an effect that is none",
