@@ -11,7 +11,7 @@ use crate::apart::Paths;
 use crate::folder::{Folder, figures};
 use crate::open::{Columns, Names, open};
 use crate::replace::put;
-use ident::channel::unit_of;
+use ident::channel::{DIFFERENCES, unit_of};
 use ident::identify::curves::power::{csv, in_doubt};
 use ident::identify::curves::ratio;
 use ident::identify::{Identified, identify, identify_in};
@@ -121,17 +121,26 @@ fn draw(args: &Args, log: &Log, found: &Identified, quiet: bool) -> Result<Sheet
     Ok(ident::report::run(log, found, second.as_ref().map(|(log, found)| (log, found))))
 }
 
+/// The head of a row: a channel, or of what a speed sensor reads beyond the others that sensor's own word.
+fn row_of(name: &str) -> String {
+    let own = DIFFERENCES.iter().find(|(_, difference)| *difference == name).map(|(own, _)| channel(own));
+    match own.as_deref().and_then(|said| said.strip_prefix("speed (")?.strip_suffix(')')) {
+        Some(sensor) => format!("{sensor} - other speeds"),
+        None => channel(name),
+    }
+}
+
 fn text(log: &Log, found: &Identified) -> String {
     let mut out = format!("{}\n\n", wrapped(&headline(found), 0)) + &levels(log, found);
     out += "\ndeclared relations over all rows (of the speed in 1000 rev/min; of the pulse above 1000 us in ms)\n";
     for p in &found.model.polynomials {
         let all = terms(p.coefficients.iter().copied().zip(p.errors.iter().map(|se| 1.96 * se)));
-        out += &format!("{:<20} {}\n", channel(&p.channel), wrapped(&all, 21));
+        out += &format!("{:<20} {}\n", row_of(&p.channel), wrapped(&all, 21));
     }
     for q in &found.quality {
         out += &format!(
             "{:<20} rms {} {}, noise floor {}, R2 {:.6}\n",
-            channel(q.channel),
+            row_of(q.channel),
             number(q.rms),
             q.unit,
             number(q.noise_floor),

@@ -67,6 +67,21 @@ fn a_broken_blade_is_told_as_one_cause() {
     }
 }
 
+/// A blade that breaks right behind the edge of a stretch that a fold leaves out: what it does to the current is learnt from that stretch alone.
+#[test]
+fn a_blade_that_breaks_at_the_edge_of_a_fold_keeps_its_name() {
+    let folder = TempDir::new().unwrap();
+    let out = demo(folder.path(), &["--seed", "31", "--effect", "blade_damage"]);
+    assert!(out.contains("hidden was blade_damage: found"), "{out}");
+    // and no channel is worse for it
+    for (name, c) in verdict(folder.path())["channels"].as_object().expect("channels") {
+        let error = |when: &str| c[when]["heldout_rms"].as_f64();
+        if let (Some(before), Some(after)) = (error("before"), error("after")) {
+            assert!(after <= 1.02 * before, "{name}: {after} was {before}");
+        }
+    }
+}
+
 #[test]
 fn every_hidden_effect_is_named_and_its_error_falls() {
     let mut missed = Vec::new();

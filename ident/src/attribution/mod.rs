@@ -15,6 +15,7 @@ pub(crate) mod correction;
 pub(crate) mod depends;
 pub mod diagnose;
 pub mod evidence;
+pub(crate) mod jump;
 pub mod long;
 pub(crate) mod moment;
 pub(crate) mod opponent;

@@ -8,6 +8,7 @@
 //! Reference: specification `formats.md`, "Verdict" (`unexplained`); `closing-the-loop.md`, steps 2 and 7.
 
 use crate::attribution::depends::{goes_with, seems_to_go_with};
+use crate::attribution::jump;
 use crate::attribution::opponent::{is_second_meter, left_over};
 use crate::channel::{Context, DIFFERENCES, Relation, Target};
 use crate::fit::Fit;
@@ -108,15 +109,17 @@ enum Look {
 
 fn look(target: &Target, residual: &[f64], squares: &[f64]) -> Look {
     let whole = squares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-    let on_the_way: f64 = squares.iter().zip(&target.unsettled).filter(|(_, u)| **u).map(|(s, _)| s).sum();
-    if 2.0 * on_the_way > whole {
-        return Look::OnTheWay;
-    }
     let mut largest = squares.to_vec();
     largest.sort_unstable_by(|a, b| b.total_cmp(a));
     let few = (FEW * largest.len() as f64).ceil() as usize;
-    if 2.0 * largest.iter().take(few).sum::<f64>() > whole {
-        return of_few_rows(residual, squares);
+    let of_few = (2.0 * largest.iter().take(few).sum::<f64>() > whole).then(|| of_few_rows(residual, squares));
+    let on_the_way: f64 = squares.iter().zip(&target.unsettled).filter(|(_, u)| **u).map(|(s, _)| s).sum();
+    // one step of many tells more than that it was a step
+    match of_few {
+        Some(Look::InOne(stretch)) => return Look::InOne(stretch),
+        _ if 2.0 * on_the_way > whole => return Look::OnTheWay,
+        Some(of_few) => return of_few,
+        None => {}
     }
     match effective_share(residual) {
         share if share < SLOW => Look::Slow,
@@ -160,7 +163,10 @@ pub(crate) fn looks_like(context: &Context, target: &Target, residual: &[f64]) -
         Look::InOne(stretch) => return in_one(context, target, &stretch),
         Look::InSingleRows => return "in single rows".to_owned(),
         Look::InBursts => return "in short bursts".to_owned(),
-        Look::Slow => "slow",
+        Look::Slow => match jump(context, target, residual) {
+            Some(said) => return said,
+            None => "slow",
+        },
         Look::OverSeveralRows => "over several rows",
         Look::Quick => "from row to row",
     };
@@ -217,6 +223,19 @@ fn is_behind_steps(context: &Context, target: &Target, squares: &[f64]) -> bool 
         }
     }
     2.0 * inside > whole && (rows as f64) < BEGINNING.1 * squares.len() as f64
+}
+
+/// A residual that jumps once, in words.
+fn jump(context: &Context, target: &Target, residual: &[f64]) -> Option<String> {
+    let load = context.regressor(target.relation).filter(|load| load.len() == context.len());
+    let claimed: Vec<(f64, usize)> =
+        residual.iter().copied().zip(target.rows.iter().copied()).filter(|(_, row)| target.claims(*row)).collect();
+    let (left, rows): (Vec<f64>, Vec<usize>) = claimed.into_iter().unzip();
+    let loads: Option<Vec<f64>> = load.map(|load| rows.iter().map(|row| load[*row]).collect());
+    let jump = jump::found(&left, loads.as_deref(), target.noise.rms)?;
+    let at = rows.get(jump.from).and_then(|row| context.t.get(*row))?;
+    let when = if context.time_is_row { format!("at row {at:.0}") } else { format!("at {at:.1} s") };
+    Some(format!("a jump {when}{}", if jump.grows { ", larger where the load is" } else { "" }))
 }
 
 /// Where a stretch of a target's samples lies in the log.

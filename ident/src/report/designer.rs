@@ -101,12 +101,14 @@ fn figures(levels: &[Level]) -> Vec<Figure> {
             .collect(),
     };
     let x_label = if over == "pulse_us" { "pulse, us" } else { "speed, rev/min" };
+    // what no level tells has no place in a legend
+    let has_marks = |layer: &Layer| !matches!(layer, Layer::Marks { marks, .. } if marks.is_empty());
     let figure = |id: &str, title: &str, x_label: &str, y_label: &str, layers: Vec<Layer>| Figure {
         id: id.into(),
         title: title.into(),
         x_label: x_label.into(),
         y_label: y_label.into(),
-        layers,
+        layers: layers.into_iter().filter(has_marks).collect(),
         ..Figure::default()
     };
     vec![

@@ -28,6 +28,8 @@ pub(super) const OPEN: f64 = 0.05;
 /// Probability from which on a rival is told beside a name: below it its figure is zero to two digits.
 const COUNTED: f64 = 0.005;
 
+/// Share of an error below which a name takes next to nothing: the factor before over after is 1.00.
+const LITTLE: f64 = 0.005;
 /// Times the error before from which on an error without an effect is said to be larger.
 const MORE: f64 = 1.02;
 
@@ -38,7 +40,7 @@ pub(super) fn cards(sheet: &mut Sheet, page: &Page<'_>) {
     let group = |e: &EffectEntry| match e.id.as_str() {
         "unknown" => 2,
         _ if e.is_of_single_readings() => 3,
-        _ if (page.words.of_every_rig)(e) => 1,
+        _ if e.kin != Kin::Own => 1,
         _ => 0,
     };
     let noun = page.words.noun;
@@ -165,7 +167,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     let on = channels_of(v, group);
     let zero = zero_in(page.words, e);
     let told = e.told_probability() < e.probability;
-    let there = if open_sizes(e).is_some() || !zero.is_empty() && !told { " that it is there" } else { "" };
+    let there = open_sizes(e).is_some() || !zero.is_empty() && !told;
     // what has no name is sure of nothing but that something is there
     let nameless = e.id == "unknown";
     let sure = if nameless { "perhaps" } else { sureness(e.told_probability()) };
@@ -174,7 +176,7 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
         format!("no name; {}", that_it_is_there(e.probability))
     } else {
         let none = Rival::none(v, page.words, e, &against).probability;
-        contest(e, &format!("{sure}{there}"), &against, none) + &zero
+        contest(e, &if there { of_its_being(sure) } else { sure.to_owned() }, &against, none) + &zero
     };
     let rather = if nameless { None } else { leading(page, e, &against) };
     let title = match &rather {
@@ -227,6 +229,11 @@ fn card(sheet: &mut Sheet, page: &Page<'_>, group: &[usize], number: Option<usiz
     sheet.html_part(&format!("{html}</div></div></article>\n"));
 }
 
+/// How sure it is that something is there whose size is open.
+fn of_its_being(sure: &str) -> String {
+    if sure == "sure" { "sure that it is there".to_owned() } else { format!("{sure} there") }
+}
+
 /// The title where a rival is likelier than the name that the model holds: both, the likelier first.
 fn leading(page: &Page<'_>, e: &EffectEntry, against: &[Rival]) -> Option<String> {
     let rival = against.first().filter(|r| r.probability > e.probability && !r.ids.is_empty())?;
@@ -244,10 +251,13 @@ pub(super) fn why(words: Vocabulary, e: &EffectEntry) -> &'static str {
 /// How sure a name is, its probability, and what stands against it; `none`: that it has no cause of its own, or another set of names.
 fn contest(e: &EffectEntry, sure: &str, against: &[Rival], none: f64) -> String {
     let p = equals(&probability(e.probability));
+    // a name may be plain in thousands of rows, and change nothing that a reader would see
+    let little = 0.0 < e.heldout_error_reduction && e.heldout_error_reduction < LITTLE;
     match against.first().filter(|r| r.probability >= COUNTED) {
         Some(rival) => format!("{sure}: p {p}, rival {}", equals(&probability(rival.probability))),
         None if none >= OPEN => format!("{sure}: p {p}, other names or none {}", equals(&probability(none))),
         None if e.of_no_run().is_some() => format!("{sure}: p {p}, no rival; its size differs from run to run"),
+        None if little => format!("{sure}: p {p}, no rival; it takes next to nothing"),
         None => format!("{sure}: p {p}, no rival"),
     }
 }
@@ -492,5 +502,9 @@ mod tests {
         assert_eq!(contest(&e, "probably", &[rival(0.3)], 0.0), "probably: p = 0.63, rival = 0.30");
         assert_eq!(contest(&e, "probably", &[], 0.25), "probably: p = 0.63, other names or none = 0.25");
         assert_eq!(contest(&e, "probably", &[rival(0.001)], 0.0), "probably: p = 0.63, no rival");
+        let little = EffectEntry { heldout_error_reduction: 0.004, ..e.clone() };
+        assert_eq!(contest(&little, "sure", &[], 0.0), "sure: p = 0.63, no rival; it takes next to nothing");
+        let more = EffectEntry { heldout_error_reduction: 0.006, ..e };
+        assert_eq!(contest(&more, "sure", &[], 0.0), "sure: p = 0.63, no rival");
     }
 }
