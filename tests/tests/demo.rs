@@ -96,6 +96,8 @@ fn every_hidden_effect_is_named_and_its_error_falls() {
                 continue;
             };
             assert!(out.contains(": found"), "{out}");
+            assert_eq!(entry["kin"], "own", "{entry}");
+            assert!(effects.iter().filter(|e| e["id"] == "rotor_inertia").all(|e| e["kin"] == "every_rig"), "{effects:?}");
             let reduction = entry["heldout_error_reduction"].as_f64().expect("a reduction");
             assert!(reduction > 0.2, "{id}, seed {seed}: held-out error falls by {reduction}");
         }

@@ -111,6 +111,27 @@ fn what_differs_from_run_to_run_is_of_each_run() {
     assert!(!effects.iter().any(|e| e.id == "battery_discharge"), "{effects:?}");
 }
 
+/// Leads that differ by less than that stay one cause: how they differ is told in the unit of the value, what one for all of them leaves goes with
+/// the load, and what a run alone says of its rotor is its own word.
+#[test]
+fn leads_that_differ_a_little_are_told_apart_beside_their_mean() {
+    let folder = TempDir::new().unwrap();
+    let lead = |ohm: f64| format!("[[effect]]\nid = \"supply_sag\"\nresistance_ohm = {ohm}\n");
+    let logs =
+        [0.05, 0.065, 0.08, 0.09, 0.105].iter().zip(1..).map(|(ohm, n)| flown(folder.path(), n, "", &lead(*ohm))).collect();
+    let (_, outcome) = together(logs);
+    let sag = entry(&outcome, "supply_sag");
+    assert!(sag.run.is_none() && sag.evidence.contains("the runs disagree: alone they have"), "{}", sag.evidence);
+    assert!(sag.evidence.contains(" mohm for the resistance"), "{}", sag.evidence);
+    let left = outcome.verdict.unexplained.iter().find(|u| u.channel == "voltage_v").expect("one lead for all is not enough");
+    assert!(left.depends_on.iter().any(|v| ["pulse_us", "rpm_opto", "current_a"].contains(&v.as_str())), "{left:?}");
+    let of = |id: &str| outcome.model.effects.iter().position(|e| e.placed.effect.id() == id).expect("named");
+    let lags = &outcome.alone[of("spinup_lag")];
+    let friction = |run: &Vec<ident::effects::Estimate>| run.iter().find(|e| e.name == "friction").map(|e| e.value.to_bits());
+    let own: std::collections::BTreeSet<Option<u64>> = lags.iter().map(friction).collect();
+    assert!(own.len() == 5 && !own.contains(&None), "{lags:?}");
+}
+
 #[test]
 fn runs_at_other_supply_voltages_are_one_rig() {
     let folder = TempDir::new().unwrap();

@@ -199,11 +199,12 @@ fn disagreement(context: &Context, placed: &Placed, shared: &[Estimate], alone: 
     let shared = reported(shared);
     let (name, [least, most]) = scatter::disagreement(&shared, &runs)?;
     let unit = shared.iter().find(|e| e.name == name).map_or("", |e| e.unit.as_str());
-    let (factor, unit) = scaled(least.abs().max(most.abs()), unit);
+    // as the value itself is told
+    let together = shared.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.value);
+    let (factor, unit) = scaled(together, unit);
     let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
     let told = |v: f64| digits(factor * v, 0.005 * (factor * v).abs());
     let what = parameter_of(placed.effect.id(), &name);
-    let together = shared.iter().find(|e| e.name == name).map_or(f64::NAN, |e| e.value);
     let how = if (least..=most).contains(&together) { DISAGREE } else { OTHERWISE };
     Some(format!("{how}: alone they have {} to {}{unit} for the {what}", told(least), told(most)))
 }
