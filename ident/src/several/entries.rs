@@ -157,11 +157,14 @@ pub(super) fn loudest<'a>(after: &'a [Across], channel: &str) -> Option<&'a Acro
     after.iter().filter(|a| a.channel == channel).max_by(|a, b| a.rms.total_cmp(&b.rms))
 }
 
+/// What a rest looks like, and the variables that it goes with.
+pub(super) type Looks = (String, Vec<String>);
+
 /// Every channel that is loud on a run after all, once, as large as over all runs, with the run on which it is loudest, and what is left there
 /// goes with; and every contrast of a speed sensor that a run alone left unexplained.
 pub(super) fn unexplained(
     runs: &[Run],
-    looks: &dyn Fn(&Across) -> Option<(String, Vec<String>)>,
+    looks: &dyn Fn(&Across) -> Option<Looks>,
     after: &[Across],
     channels: &Channels,
 ) -> Vec<Unexplained> {
