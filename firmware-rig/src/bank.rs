@@ -292,3 +292,48 @@ fn median(values: [Option<f32>; CAPTURE_CHANNELS]) -> Option<f32> {
 fn in_order(a: f32, b: f32) -> (f32, f32) {
     if b < a { (b, a) } else { (a, b) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever the order, and whichever are missing.
+    #[test]
+    fn the_median_of_none_to_four() {
+        assert_eq!(median([None; 4]), None);
+        for (given, middle) in [
+            ([Some(7.0), None, None, None], 7.0),
+            ([Some(7.0), Some(3.0), None, None], 5.0),
+            ([Some(7.0), Some(3.0), Some(4.0), None], 4.0),
+            ([Some(7.0), Some(3.0), Some(4.0), Some(1.0)], 3.5),
+        ] {
+            for turned in 0..4 {
+                let mut order = given;
+                order.rotate_left(turned);
+                assert_eq!(median(order), Some(middle), "{order:?}");
+                order.reverse();
+                assert_eq!(median(order), Some(middle), "{order:?}");
+                order.swap(0, 1);
+                assert_eq!(median(order), Some(middle), "{order:?}");
+            }
+        }
+    }
+
+    /// 3000 rev/min is a revolution in 20 ms: what is compared with is at least 30 ms old, and then the one before that.
+    #[test]
+    fn what_still_agrees_follows_what_the_speed_changed_over_a_revolution_and_a_half() {
+        let mut bank = CaptureBank::new(&Config::thesis_570kv());
+        let mut change = |ms: u64, middle: f32| (bank.tolerance(Ticks::from_ms(ms), Some(middle)) - DISAGREEMENT) * middle;
+        assert_eq!(change(0, 3000.0), f32::INFINITY, "nothing to compare with");
+        let close = |found: f32, expected: f32| assert!((found - expected).abs() < 0.01, "{found} is not {expected}");
+        close(change(10, 3010.0), 10.0);
+        close(change(29, 3000.5), 0.5);
+        close(change(31, 3050.0), 50.0); // kept from now on, beside the first
+        close(change(50, 3020.0), 20.0);
+        close(change(60, 3000.0), 0.0);
+        close(change(62, 3000.0), 0.0); // the first goes with the next
+        close(change(80, 3000.0), 50.0);
+        bank.tolerance(Ticks::from_ms(90), None);
+        assert_eq!(bank.tolerance(Ticks::from_ms(91), Some(3000.0)), f32::INFINITY, "none turned in between");
+    }
+}

@@ -290,6 +290,39 @@ mod tests {
         assert!((at(4, 0.75) - 25.0).abs() < 1e-3, "TMP36: 750 mV at 25 degC");
     }
 
+    /// The beam may carry half of what bends it for good (Table 7), up and down.
+    #[test]
+    fn the_thrust_limit_is_half_the_yield_of_the_beam() {
+        let config = Config::thesis_570kv();
+        let beam = config.strain.beam;
+        let thrust = config.limits.thrust;
+        let (low, high) = (thrust.low.unwrap(), thrust.high.unwrap());
+        assert_eq!(low.0, -high.0);
+        assert!((beam.stress(high) / beam.yield_pa - 0.5).abs() < 1e-6, "{high}");
+    }
+
+    /// What is told as the range is what the lowest and the highest code say, whichever way the gauges are glued.
+    #[test]
+    fn the_load_range_ends_at_the_converter_s_ends() {
+        let config = Config::thesis_570kv();
+        for down_is_positive in [true, false] {
+            let config = Config { strain: StrainChannel { down_is_positive, ..config.strain }, ..config.clone() };
+            let scale = config.calibration().adc[0];
+            let of = |code: f32| (code - scale.zero) * scale.gain;
+            let ends = if down_is_positive { (of(4095.0), of(0.0)) } else { (of(0.0), of(4095.0)) };
+            let (low, high) = config.load_range();
+            assert_eq!((low.0, high.0), ends);
+            assert!(low.0 < 0.0 && high.0 > 0.0, "{low} to {high}");
+        }
+    }
+
+    /// From 40 ms on there is time for the long sampling.
+    #[test]
+    fn fast_logs_sample_shortly() {
+        let with = |ms| Config { log_period: Ticks::from_ms(ms), ..Config::thesis_570kv() }.sampling_cycles();
+        assert_eq!([with(1), with(10), with(39), with(40), with(100), with(1000)], [15, 15, 15, 56, 56, 56]);
+    }
+
     #[test]
     fn log_rates_are_one_to_a_thousand() {
         let with = |ms| Config { log_period: Ticks::from_ms(ms), ..Config::thesis_570kv() }.log_period().as_ms();

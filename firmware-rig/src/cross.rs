@@ -113,3 +113,101 @@ impl CrossChecks {
         self.asked && self.line.as_mut().is_some_and(|line| line.asks(now))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    const MS: u64 = 84_000;
+
+    /// A meter of 11 pole pairs beside an optical sensor with one tab.
+    struct Pair {
+        bank: CaptureBank,
+        cross: CrossChecks,
+        now: u64,
+    }
+
+    impl Pair {
+        fn new() -> Self {
+            let config = Config { marks: [0, 1, 0, 0], back_emf: 11, ..Config::thesis_570kv() };
+            Self { bank: CaptureBank::new(&config), cross: CrossChecks::new(&config), now: 0 }
+        }
+
+        /// Takes what came since the last tick.
+        fn take(&mut self, now: u64, opto: &[u64], meter: &[u64]) {
+            let [opto, meter] = [opto, meter].map(|list| list.iter().map(|at| *at as u32).collect::<Vec<u32>>());
+            self.now = now;
+            self.bank.take(Ticks(now), &[&[], &opto, &[], &[]], &[false; 4]);
+            self.cross.take(Ticks(now), &Beside { back_emf: &meter, ..Beside::UNWIRED });
+        }
+
+        fn told(&mut self) -> CaptureVerdict {
+            self.bank.sample(Ticks(self.now));
+            self.cross.sample(Ticks(self.now), &self.bank).1.map_or(CaptureVerdict::Absent, |code| code.verdict)
+        }
+    }
+
+    /// A meter that sees nothing is no fault while the rotor stands or hardly turns: below its threshold it cannot see it.
+    #[test]
+    fn a_silent_meter_is_lost_only_beside_a_rotor_that_turns_well() {
+        let beside = |revolution_ms: u64| {
+            let mut pair = Pair::new();
+            for n in 0..3000 {
+                let opto = [n * MS];
+                let marks: &[u64] = if revolution_ms > 0 && n % revolution_ms == 0 { &opto } else { &[] };
+                pair.take(n * MS, marks, &[]);
+            }
+            pair.told()
+        };
+        assert_eq!(
+            [beside(0), beside(240), beside(20)],
+            [CaptureVerdict::Stopped, CaptureVerdict::Stopped, CaptureVerdict::Lost]
+        );
+    }
+
+    /// A reading of the meter holds many revolutions: its last one is looked at period by period, the earlier ones are not.
+    #[test]
+    fn the_last_revolution_of_the_meter_is_looked_at_for_missed_edges() {
+        let missed = |back: u64| {
+            let mut pair = Pair::new();
+            let edges: Vec<u64> = (1..=100).filter(|n| *n != 100 - back).map(|n| n * MS).collect(); // 11 ms a revolution
+            for turn in 1..=9 {
+                pair.take(11 * turn * MS, &[11 * turn * MS], &[]);
+            }
+            pair.take(100 * MS, &[], &edges);
+            pair.told()
+        };
+        assert_eq!(
+            [missed(1), missed(2), missed(11), missed(20)].map(|told| told == CaptureVerdict::Missed),
+            [false, true, true, false]
+        );
+    }
+
+    /// 1 % to the last bit is agreement, as among the sensors.
+    #[test]
+    fn one_per_cent_to_the_last_bit_is_agreement() {
+        let speed = |revolution: u64| 60.0 * Ticks::HZ as f32 / revolution as f32;
+        let edge = (20_000..40_000u64).map(|n| n * 50).find_map(|middle| {
+            let off = speed(middle) - 0.01 * speed(middle);
+            let near = (speed(1) / off) as u64 / 11 * 11;
+            let same = |r: &u64| (speed(*r) - speed(middle)).abs() == 0.01 * speed(middle);
+            [near - 11, near, near + 11].into_iter().find(same).map(|other| (middle, other))
+        });
+        let (middle, other) = edge.expect("one of twenty thousand");
+        let verdict = |turn: u64| {
+            let mut pair = Pair::new();
+            let mut last = CaptureVerdict::Absent;
+            for n in 1..=60 {
+                // ten revolutions of the sensor a sample, the meter's edges up to there
+                let (from, to) = ((n - 1) * 4 * middle, n * 4 * middle);
+                let opto: Vec<u64> = (1..=4).map(|k| from + k * middle).collect();
+                let meter: Vec<u64> = (from / (turn / 11) + 1..=to / (turn / 11)).map(|k| k * (turn / 11)).collect();
+                pair.take(to, &opto, &meter);
+                last = pair.told();
+            }
+            last
+        };
+        assert_eq!([verdict(other), verdict(other + 110)], [CaptureVerdict::Nominal, CaptureVerdict::Disagrees]);
+    }
+}

@@ -182,7 +182,8 @@ mod tests {
     #[test]
     fn a_frame_gives_its_figures_and_their_age() {
         let mut line = EscLine::default();
-        assert_eq!(line.code(Ticks::from_ms(5)).verdict, EscVerdict::Silent, "nothing was heard yet");
+        let none = line.code(Ticks::from_ms(5));
+        assert_eq!((none.verdict, none.age_ms), (EscVerdict::Silent, u16::MAX), "nothing was heard yet");
         let code = hear(&mut line, 10, &words(&FRAME));
         assert_eq!((code.verdict, code.age_ms), (EscVerdict::Nominal, 3));
         assert_eq!((code.temperature, code.voltage, code.current, code.charge, code.speed), (41, 1148, 1234, 77, 451));
@@ -197,6 +198,7 @@ mod tests {
         let mut line = EscLine::default();
         let all = words(&FRAME);
         line.take(Ticks::from_ms(10), &all[..4]);
+        assert_eq!(line.verdict(Ticks::from_ms(10)), EscVerdict::Silent, "half a frame is not damaged");
         line.take(Ticks::from_ms(11), &all[4..]);
         line.take(Ticks::from_ms(12), &[]);
         assert_eq!(line.counts(), EscCounts::default(), "more bytes may come");
@@ -222,6 +224,18 @@ mod tests {
             assert_eq!(hear(&mut line, ms + 31, &words(&FRAME)).verdict, EscVerdict::Nominal, "after {bad:?}");
         }
         assert_eq!(line.counts(), EscCounts { good: 6, damaged: 6, errors: 1 });
+    }
+
+    /// A stream without a pause is told as garbled at once, and as silence a while after it ended.
+    #[test]
+    fn what_is_no_frame_is_told_while_it_is_new() {
+        let mut line = EscLine::default();
+        line.take(Ticks::from_ms(10), &[0x55; LENGTH + 1]);
+        let at = |ms: u64| line.verdict(Ticks::from_ms(ms));
+        assert_eq!(
+            [at(10), at(10 + STALE_MS), at(11 + STALE_MS)],
+            [EscVerdict::Garbled, EscVerdict::Garbled, EscVerdict::Silent]
+        );
     }
 
     #[test]

@@ -174,6 +174,32 @@ mod tests {
         assert_eq!(of(2, &[]), Nominal);
     }
 
+    /// Where each pattern begins: what is on the edge is none yet.
+    #[test]
+    fn what_is_not_quite_a_pattern() {
+        assert_eq!(of(25, &[100, 160, 100]), Nominal, "1.6 times its neighbours");
+        assert_eq!(of(25, &[100, 161, 100]), Missed);
+        assert_eq!(of(1, &[100, 60, 70, 101]), Nominal, "two periods that take 1.3 times the one before");
+        assert_eq!(of(1, &[100, 60, 69, 101]), Doubled);
+        assert_eq!(of(2, &[95, 105, 95, 105, 95, 105]), Nominal, "ten per cent");
+        assert_eq!(of(2, &[94, 106, 94, 106, 94, 106]), Alternating);
+        assert_eq!(of(2, &[90, 110, 90, 110]), Nominal, "too few periods");
+        assert_eq!(of(2, &[90, 110, 90, 110, 90, 110, 90]), Nominal, "one more of the one than of the other");
+        assert_eq!(of(2, &[100, 100, 60, 80, 60, 80]), Nominal, "two alike do not alternate");
+        assert_eq!(of(2, &[80, 60, 80, 60, 100, 100]), Nominal, "two alike at the end");
+        assert_eq!(of(2, &[100, 120, 100, 200, 100, 120]), Missed, "uneven marks, and one of them missed");
+    }
+
+    /// Even periods between two long ones are marks beside two that were missed, uneven ones are marks that were seen twice.
+    #[test]
+    fn marks_between_two_missed_ones_are_not_seen_twice() {
+        assert_eq!(of(25, &[100, 100, 200, 100, 100, 100, 100, 200]), Missed);
+        assert_eq!(of(25, &[100, 100, 200, 95, 105, 100, 95, 200]), Missed, "with the error of an encoder");
+        assert_eq!(of(25, &[200, 86, 115, 100, 100, 200]), Nominal, "spread by less than 30 %");
+        assert_eq!(of(25, &[200, 85, 115, 100, 100, 200]), Doubled, "by 30 %");
+        assert_eq!(of(1, &[100, 30, 70, 50, 50, 100]), Doubled, "the second mark of two in its middle");
+    }
+
     #[test]
     fn unevenness_is_the_difference_of_two_and_none_of_a_ramp() {
         let uneven = |marks, periods: &[u32]| unevenness(marks, periods.iter().copied());

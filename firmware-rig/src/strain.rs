@@ -174,6 +174,7 @@ mod tests {
         close(Bridge::Half.ratio(2.0, 0.05), 0.050_125, 1e-4);
         close(Bridge::Full.ratio(2.0, 0.05), 0.1, 1e-6);
         close(Bridge::Quarter.ratio(2.0, 1e-6), 0.25 * 2.0 * 1e-6, 1e-4);
+        close(Bridge::Quarter.ratio(2.0, 0.05), 0.1 / 4.2, 1e-6); // one arm of R + dR against R
         assert!((Bridge::Half.ratio(2.0, 0.05) - 0.025).abs() > 0.02, "the printed E/4 for a half bridge is wrong by two");
     }
 

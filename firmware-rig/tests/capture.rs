@@ -235,10 +235,10 @@ fn the_first_capture_is_dropped() {
     let mut bank = CaptureBank::new(&config);
     // The timer's own match at 0, then one revolution of 60 ms on the opto channel.
     bank.take(Ticks(MS), &[&[], &[0], &[], &[]], &[false; 4]);
-    bank.take(Ticks(10 * MS), &[&[], &[10 * MS as u32], &[], &[]], &[false; 4]);
-    assert_eq!(bank.sample(Ticks(10 * MS))[1].verdict, CaptureVerdict::Stopped, "one edge is no speed");
-    bank.take(Ticks(70 * MS), &[&[], &[70 * MS as u32], &[], &[]], &[false; 4]);
-    let code = bank.sample(Ticks(70 * MS))[1];
+    bank.take(Ticks(55 * MS), &[&[], &[55 * MS as u32], &[], &[]], &[false; 4]);
+    assert_eq!(bank.sample(Ticks(55 * MS))[1].verdict, CaptureVerdict::Stopped, "one edge is no speed");
+    bank.take(Ticks(115 * MS), &[&[], &[115 * MS as u32], &[], &[]], &[false; 4]);
+    let code = bank.sample(Ticks(115 * MS))[1];
     assert_eq!((code.edges, code.span), (1, 60 * MS as u32));
 }
 

@@ -99,6 +99,68 @@ fn impossible_settings_change_nothing() {
     assert!(nonsense.iter().all(|config| !config.in_range()));
 }
 
+/// One channel of any kind is a rig, none is not.
+#[test]
+fn a_rig_measures_something() {
+    let with = |marks, fitted| RigConfig { marks, fitted, ..factory() }.in_range();
+    let load_cell = [true, false, false, false, false];
+    assert!(with([0, 1, 0, 0], [false; 5]) && with([0; 4], load_cell) && with([2, 0, 0, 0], load_cell));
+    assert!(!with([0; 4], [false; 5]));
+}
+
+/// An ESC that answers nothing is held at full throttle for 2 s or more, and for less than the time-out of the holding.
+#[test]
+fn a_silent_esc_is_held_long_enough_and_not_too_long() {
+    let with = |hold_ms: u16, hold_min_ms: u32| {
+        let mut config = factory();
+        config.esc.answers = Answers::Silent { hold_ms };
+        config.esc.hold_min_ms = hold_min_ms;
+        config.in_range()
+    };
+    assert!(with(2000, 10_000) && with(9999, 10_000));
+    assert!(!with(1999, 10_000), "too short to be noticed");
+    assert!(!with(10_000, 10_000) && !with(20_000, 10_000), "the time-out would come first");
+}
+
+/// Between two limits there is room.
+#[test]
+fn limits_that_leave_no_room_are_refused() {
+    let with = |low, high| {
+        let mut config = factory();
+        config.limits.voltage = Bounds { low: Some(Volt(low)), high: Some(Volt(high)), ms: 100 };
+        config.in_range()
+    };
+    assert!(with(9.0, 13.0));
+    assert!(!with(9.0, 9.0) && !with(13.0, 9.0));
+}
+
+/// A scale that was calibrated tells one number for each code, and errors that are lengths.
+#[test]
+fn a_calibrated_scale_is_a_scale() {
+    let good = Calibrated {
+        scale: AdcScale { zero: 2048.0, gain: -0.01 },
+        zero_sigma: 0.0,
+        gain_sigma: 0.1,
+        residual: 0.1,
+        worst: 0.2,
+        points: 5,
+        day: 1,
+    };
+    let possible = |calibrated| RigConfig { calibrated: [None, Some(calibrated), None, None, None], ..factory() }.in_range();
+    assert!(possible(good));
+    for nonsense in [f32::NAN, f32::INFINITY] {
+        assert!(!possible(Calibrated { scale: AdcScale { zero: nonsense, ..good.scale }, ..good }));
+        assert!(!possible(Calibrated { scale: AdcScale { gain: nonsense, ..good.scale }, ..good }));
+    }
+    assert!(!possible(Calibrated { scale: AdcScale { gain: 0.0, ..good.scale }, ..good }), "every code the same");
+    for nonsense in [f32::NAN, f32::INFINITY, -0.1] {
+        assert!(!possible(Calibrated { zero_sigma: nonsense, ..good }));
+        assert!(!possible(Calibrated { gain_sigma: nonsense, ..good }));
+        assert!(!possible(Calibrated { residual: nonsense, ..good }));
+        assert!(!possible(Calibrated { worst: nonsense, ..good }));
+    }
+}
+
 /// The arithmetic of the line is that of the codec: no sample is longer than what was reckoned with.
 #[test]
 fn no_sample_is_longer_than_the_arithmetic_says() {
