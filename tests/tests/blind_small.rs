@@ -70,6 +70,12 @@ fn what_the_first_guess_hides_is_found() {
     ]);
 }
 
+/// A damaged blade in the first third of a run: a part of the run that shows its loss of speed on two levels alone does not speak against it.
+#[test]
+fn what_a_part_of_the_run_cannot_tell_is_no_error() {
+    names_are(&[(97723, "blade_damage", "!")]);
+}
+
 /// Rigs of the tuning half with something nameless that wanders on thrust: nothing that is lost in it is named. What shows through something that
 /// wanders is: a zero that jumps, a lead's resistance.
 #[test]

@@ -47,7 +47,8 @@ pub(crate) fn correct(
     let wanted: Vec<bool> = (0..context.targets.len()).map(|k| group.contains(&k)).collect();
     let tried = |terms: usize, fit: Fit| {
         let placed = |_: &[bool]| fit.placed.clone();
-        let sums: Vec<Vec<Sum>> = folds.iter().map(|out| heldout::left_out(context, declared, out, &wanted, &placed)).collect();
+        let sums: Vec<Vec<Sum>> =
+            folds.iter().map(|out| heldout::left_out(context, declared, out, &wanted, None, &placed)).collect();
         let in_floors = |fold: &Vec<Sum>, k: &usize| fold[*k].claimed_squares / context.targets[*k].noise.rms.powi(2).max(1e-300);
         let squares = sums.iter().map(|fold| group.iter().map(|k| in_floors(fold, k)).sum()).collect();
         Tried { terms, fit, sums, squares }

@@ -21,7 +21,7 @@ use crate::effects::NEEDED_EVIDENCE;
 use crate::effects::placed::Placed;
 use crate::fit::heldout::{self, Around, Held};
 use crate::fit::search::refine;
-use crate::fit::{Rows, allow_for_the_form, fit, plausible};
+use crate::fit::{Fit, Rows, allow_for_the_form, fit, plausible};
 use crate::log::sparse::TOO_FEW;
 use crate::log::{Column, Log};
 use crate::model::Declared;
@@ -192,11 +192,11 @@ impl AllRows<'_> {
         let (context, declared) = (self.context, self.declared);
         let start = fit(context, declared, &[], None, Rows::All)?;
         let spoken: Vec<bool> = context.targets.iter().map(|t| !t.relation.is_evidence()).collect();
-        d.heldout_before = self.errors(&[], &spoken, &[]);
+        d.heldout_before = self.errors(&start, &spoken, &[]);
         progress(0.2);
         let placed = self.refined(&read_off(context, &d.best.fit.placed));
         let mut best = Candidate { evidence: d.best.evidence, fit: fit(context, declared, &placed, Some(&start), Rows::All)? };
-        d.heldout_after = self.errors(&placed, &self.touched(&placed), &d.heldout_before);
+        d.heldout_after = self.errors(&best.fit, &self.touched(&placed), &d.heldout_before);
         progress(0.4);
         if asked && !d.unknown {
             self.of_rows(&mut best, &mut d.heldout_after);
@@ -208,7 +208,7 @@ impl AllRows<'_> {
         let found = fit(self.means, declared, &placed, Some(&plain), Rows::All)?;
         d.heldout_without = (0..placed.len())
             .map(|k| match without(self.means, declared, &found, k, &plain) {
-                Some(others) => self.errors(&others.placed, &self.touched(&placed[k..=k]), &d.heldout_after),
+                Some(others) => self.errors(&others, &self.touched(&placed[k..=k]), &d.heldout_after),
                 None => d.heldout_before.clone(),
             })
             .collect();
@@ -236,13 +236,13 @@ impl AllRows<'_> {
     }
 
     /// Held-out errors on all rows of the wanted targets, the others as they were; the shapes of each fold on the means.
-    fn errors(&self, placed: &[Placed], wanted: &[bool], previous: &[Held]) -> Vec<Held> {
+    fn errors(&self, fit: &Fit, wanted: &[bool], previous: &[Held]) -> Vec<Held> {
         let shapes = |keep: &[bool]| {
             let seen: Vec<bool> = self.rows.iter().map(|i| keep[*i]).collect();
-            refine(self.means, self.declared, placed, Rows::Where(&seen), heldout::EVALUATIONS)
+            refine(self.means, self.declared, &fit.placed, Rows::Where(&seen), heldout::EVALUATIONS)
         };
         let nothing = Held::UNKNOWN;
-        let pooled = heldout::pooled(self.context, self.declared, self.folds, wanted, &shapes).into_iter().enumerate();
+        let pooled = heldout::pooled(self.context, self.declared, self.folds, wanted, Some(fit), &shapes).into_iter().enumerate();
         pooled.map(|(i, e)| e.or(previous.get(i).copied()).unwrap_or(nothing)).collect()
     }
 
@@ -262,7 +262,7 @@ impl AllRows<'_> {
                 continue;
             }
             let candidate = Candidate { evidence: best.evidence + gain, fit: new };
-            let held = self.errors(&placed, &self.touched(&placed[placed.len() - 1..]), errors);
+            let held = self.errors(&candidate.fit, &self.touched(&placed[placed.len() - 1..]), errors);
             if worth_a_name(context, &candidate, gain, &Around::of(errors, &held)) {
                 (*best, *errors) = (candidate, held);
             }

@@ -1,6 +1,7 @@
 //! Errors on rows that the fit did not see.
 //!
-//! What it is: five contiguous time blocks, and every second interior plateau level, each left out in turn.
+//! What it is: five contiguous time blocks, and every second interior plateau level, each left out in turn. Of the whole run a fold knows how
+//! large each effect is, and nothing else: what its rows do not show of an effect is then no more than was found, in place of anything.
 //! What can go wrong: a fold that leaves too little to fit is skipped; its rows then do not count.
 //! Units: the channel's.
 //! Reference: specification `formats.md` (`heldout_rms`); blocked cross-validation, Roberts et al. 2017, Ecography 40:913.
@@ -80,10 +81,12 @@ impl Held {
 #[must_use]
 pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec<bool>]) -> Vec<Held> {
     let all = vec![true; context.targets.len()];
-    pooled(context, declared, folds, &all, &|keep| refine(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS))
-        .into_iter()
-        .map(|e| e.unwrap_or(Held::UNKNOWN))
-        .collect()
+    pooled(context, declared, folds, &all, Some(fit), &|keep| {
+        refine(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS)
+    })
+    .into_iter()
+    .map(|e| e.unwrap_or(Held::UNKNOWN))
+    .collect()
 }
 
 /// What the newest effect does to the held-out errors, by target.
@@ -162,15 +165,17 @@ fn left_over(target: &Target, prediction: &[f64], keep: &[bool]) -> f64 {
 /// Evaluations that each fold may spend on its shapes, starting from those of all rows.
 pub(crate) const EVALUATIONS: usize = 40;
 
-/// Held-out errors of the wanted targets, the effects of each fold as `refined` gives them for the rows that it may see.
+/// Held-out errors of the wanted targets, the effects of each fold as `refined` gives them for the rows that it may see, about as large as in the
+/// `whole` fit.
 pub(crate) fn pooled(
     context: &Context,
     declared: Declared<'_>,
     folds: &[Vec<bool>],
     wanted: &[bool],
+    whole: Option<&Fit>,
     refined: &dyn Fn(&[bool]) -> Vec<Placed>,
 ) -> Vec<Option<Held>> {
-    let by_fold: Vec<Vec<Sum>> = folds.iter().map(|out| left_out(context, declared, out, wanted, refined)).collect();
+    let by_fold: Vec<Vec<Sum>> = folds.iter().map(|out| left_out(context, declared, out, wanted, whole, refined)).collect();
     together(context, &by_fold)
 }
 
@@ -180,12 +185,14 @@ pub(crate) fn together(context: &Context, by_fold: &[Vec<Sum>]) -> Vec<Option<He
     context.targets.iter().enumerate().map(|(k, target)| whole(k).held(target)).collect()
 }
 
-/// Sums over the rows of one fold, by target, the effects as `refined` gives them for the rows that it may see.
+/// Sums over the rows of one fold, by target, the effects as `refined` gives them for the rows that it may see, about as large as in the `whole`
+/// fit.
 pub(crate) fn left_out(
     context: &Context,
     declared: Declared<'_>,
     out: &[bool],
     wanted: &[bool],
+    whole: Option<&Fit>,
     refined: &dyn Fn(&[bool]) -> Vec<Placed>,
 ) -> Vec<Sum> {
     let mut sums = vec![Sum::default(); context.targets.len()];
@@ -194,7 +201,7 @@ pub(crate) fn left_out(
     let placed: Vec<Placed> = refined(&keep).into_iter().map(taught).collect();
     let mut designs = Designs::new(context, declared, &placed);
     for (k, (target, sum)) in context.targets.iter().zip(&mut sums).enumerate().filter(|(k, _)| wanted[*k]) {
-        let Some(fitted) = designs.fit(k, Rows::Where(&keep)) else { continue };
+        let Some(fitted) = designs.fit_part(k, Rows::Where(&keep), whole) else { continue };
         let prediction = designs.of(target).predict(&fitted.coefficients, context.len());
         for (row, y) in target.rows.iter().zip(&target.y).filter(|(row, _)| out[**row]) {
             sum.add(target, *row, y - prediction[*row]);

@@ -11,6 +11,7 @@ pub mod heldout;
 pub(crate) mod remembered;
 pub(crate) mod samples;
 pub mod search;
+mod sizes;
 mod written;
 
 use crate::channel::{Context, Relation, Target};
@@ -19,7 +20,8 @@ use crate::effects::design::{Label, TargetDesign, covariance};
 use crate::effects::placed::Placed;
 use crate::effects::steps::Steps;
 use crate::fit::agreed::{Agreed, contrast_of};
-use crate::fit::samples::{Samples, Taught};
+use crate::fit::samples::{Known, Samples, Taught};
+use crate::fit::sizes::Sizes;
 use crate::model::Declared;
 use crate::numeric::solve::Solution;
 use crate::signal::colour::effective_share;
@@ -127,9 +129,16 @@ impl<'a> Designs<'a> {
 
     /// Fits the target at a position, with what its contrast says of the amplitudes that they share.
     pub(crate) fn fit(&mut self, k: usize, rows: Rows<'_>) -> Option<TargetFit> {
+        self.fit_part(k, rows, None)
+    }
+
+    /// The same on a part of the rows, with what the `whole` of them says of how large the effects are.
+    pub(crate) fn fit_part(&mut self, k: usize, rows: Rows<'_>, whole: Option<&Fit>) -> Option<TargetFit> {
         let agreed = self.agreed(k, rows);
         let target = &self.context.targets[k];
-        fit_with(target, self.of(target), rows, agreed.as_ref())
+        let design = self.of(target);
+        let sizes = whole.map(|whole| Sizes::of(target, design, &whole.targets[k]));
+        fit_with(target, design, rows, Known { agreed: agreed.as_ref(), sizes: sizes.as_ref() })
     }
 
     fn agreed(&mut self, k: usize, rows: Rows<'_>) -> Option<Agreed> {
@@ -154,13 +163,13 @@ pub enum Rows<'a> {
 /// The likelihood counts samples as independent; [`TargetFit::share`] says how many of them the colour of the residual leaves.
 #[must_use]
 pub fn fit_target(target: &Target, design: &TargetDesign, rows: Rows<'_>) -> Option<TargetFit> {
-    fit_with(target, design, rows, None)
+    fit_with(target, design, rows, Known::default())
 }
 
-fn fit_with(target: &Target, design: &TargetDesign, rows: Rows<'_>, agreed: Option<&Agreed>) -> Option<TargetFit> {
+fn fit_with(target: &Target, design: &TargetDesign, rows: Rows<'_>, known: Known<'_>) -> Option<TargetFit> {
     let log_rows = design.columns.first().map_or(design.fixed.len(), |c| c.values.len());
     let samples = Samples::new(target, rows, log_rows);
-    let (Solution { coefficients, inverse, .. }, loglik, kept) = samples.solve(design, true, agreed)?;
+    let (Solution { coefficients, inverse, .. }, loglik, kept) = samples.solve(design, true, known)?;
     let mut residual = kept.residual(&coefficients);
     residual.iter_mut().zip(&kept.floored).for_each(|(r, v)| *r /= v.sqrt());
     if let Some((unsettled, excess)) = &kept.jumps {

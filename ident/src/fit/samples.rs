@@ -12,6 +12,7 @@ use crate::effects::design::TargetDesign;
 use crate::effects::placed::Placed;
 use crate::effects::steps::Steps;
 use crate::fit::agreed::{Agreed, contrast_of};
+use crate::fit::sizes::Sizes;
 use crate::fit::{Designs, Likelihood, Rows};
 use crate::model::Declared;
 use crate::numeric::solve::{Normal, Solution, dot};
@@ -21,6 +22,26 @@ use std::sync::Arc;
 
 /// How much worse the variance after jumps must be for those samples to weigh less.
 const WORSE: f64 = 1.5;
+
+/// What is known of the amplitudes of effects beside the samples.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Known<'k> {
+    /// What another reading of the same effects has said.
+    pub(crate) agreed: Option<&'k Agreed>,
+    /// How large they are on the whole run.
+    pub(crate) sizes: Option<&'k Sizes>,
+}
+
+impl Known<'_> {
+    fn tell(self, design: &TargetDesign, normal: &mut Normal) {
+        if let Some(agreed) = self.agreed {
+            agreed.tell(design, normal);
+        }
+        if let Some(sizes) = self.sizes {
+            sizes.tell(design, normal);
+        }
+    }
+}
 
 /// The samples of one target that teach.
 pub(crate) struct Samples<'c> {
@@ -44,11 +65,11 @@ pub(crate) struct Samples<'c> {
     /// The same as positions.
     late: Vec<usize>,
     /// The columns of the last design: most of the next one's are the same.
-    known: RefCell<Vec<Known>>,
+    known: RefCell<Vec<Product>>,
 }
 
 /// A column on the samples, and its weighted products.
-struct Known {
+struct Product {
     /// The column on all rows of the log.
     column: Values,
     values: Values,
@@ -114,7 +135,7 @@ impl<'c> Samples<'c> {
 
     /// What they say of the amplitudes of a contrast's effects.
     pub(crate) fn say(&self, contrast: &TargetDesign) -> Option<Agreed> {
-        let (solution, ..) = self.solve(contrast, false, None)?;
+        let (solution, ..) = self.solve(contrast, false, Known::default())?;
         Some(Agreed::of(contrast, &solution, self.chosen.len(), self.target.least_scale()))
     }
 
@@ -152,9 +173,9 @@ impl<'c> Samples<'c> {
                 let (late, late_weighted) = (self.of_late(&values), self.of_late(&weighted));
                 let late_with_y = dot(&late_weighted, &y);
                 let late = (late, late_weighted, late_with_y);
-                Known { column: column.values.clone(), values, weighted, with_y, with_others: Vec::new(), late }
+                Product { column: column.values.clone(), values, weighted, with_y, with_others: Vec::new(), late }
             });
-            let product = |other: &Known| {
+            let product = |other: &Product| {
                 let old = own.with_others.iter().find(|(of, _)| Arc::ptr_eq(of, &other.column));
                 let new = || [dot(&own.weighted, &other.values), dot(&own.late.1, &other.late.0)];
                 (other.column.clone(), old.map_or_else(new, |o| o.1))
@@ -180,12 +201,12 @@ impl<'c> Samples<'c> {
 
     /// Solves for the coefficients with levelled weights (see [`crate::signal::noise::Noise::weight_variance`]) and counts the likelihood
     /// of the mean, and that of the scatter too where `scattering` asks for it or an effect adds scatter.
-    /// What another reading of the same effects has said of their amplitudes is `agreed`.
+    /// What else is known of the amplitudes is `known`.
     pub(crate) fn solve<'d>(
         &'d self,
         design: &'d TargetDesign,
         scattering: bool,
-        agreed: Option<&Agreed>,
+        known: Known<'_>,
     ) -> Option<(Solution, Likelihood, Kept<'d>)> {
         if self.chosen.len() < design.columns.len() + 3 {
             return None;
@@ -216,9 +237,7 @@ impl<'c> Samples<'c> {
             (columns, [whole, late])
         };
         design.expect(&mut normal, self.unit());
-        if let Some(agreed) = agreed {
-            agreed.tell(design, &mut normal);
-        }
+        known.tell(design, &mut normal);
         let mut kept = Kept { columns, y, floored, jumps: None };
         let mut solution = normal.solve()?;
         let n = self.chosen.len() as f64;
@@ -324,7 +343,8 @@ impl<'c> Taught<'c> {
         let view = scattering && target.relation == Relation::Thrust;
         let agreed = contrast_of(self.context, designs.placed, target).and_then(|k| self.agreed(k, designs));
         let design = designs.after(target, &mut self.steps.borrow_mut()[k]);
-        self.of(k).solve(design, view, agreed.as_ref()).map(|(_, loglik, _)| loglik.of(view))
+        let known = Known { agreed: agreed.as_ref(), sizes: None };
+        self.of(k).solve(design, view, known).map(|(_, loglik, _)| loglik.of(view))
     }
 
     fn agreed(&self, contrast: usize, designs: &mut Designs<'_>) -> Option<Agreed> {

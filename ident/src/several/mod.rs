@@ -24,7 +24,7 @@ use crate::channel::{Context, Relation, Target};
 use crate::close::Closed;
 use crate::effects::Stage;
 use crate::effects::placed::Placed;
-use crate::fit::samples::Samples;
+use crate::fit::samples::{Known, Samples};
 use crate::fit::{Rows, design};
 use crate::model::Declared;
 use crate::verdict::Scope;
@@ -84,7 +84,7 @@ fn weights(context: &Context, placed: &[Placed], k: usize, share: f64) -> Option
     let target = &context.targets[k];
     let design = design(context, Declared::default(), placed, target);
     let samples = Samples::new(target, Rows::All, context.len());
-    let (solution, _, kept) = samples.solve(&design, false, None)?;
+    let (solution, _, kept) = samples.solve(&design, false, Known::default())?;
     let excess = |i: usize| kept.jumps.map_or(1.0, |(unsettled, excess)| if unsettled[i] { excess } else { 1.0 });
     let residual = kept.residual(&solution.coefficients);
     let weighted = residual.iter().zip(&target.levelled).enumerate().map(|(i, (r, v))| r * r / (v * excess(i)));
