@@ -47,6 +47,7 @@ pub(crate) fn correct(
     let wanted: Vec<bool> = (0..context.targets.len()).map(|k| group.contains(&k)).collect();
     let tried = |terms: usize, fit: Fit| {
         let placed = |_: &[bool]| fit.placed.clone();
+        // a form that was only tried shows by its wild guesses that it is the wrong one
         let sums: Vec<Vec<Sum>> =
             folds.iter().map(|out| heldout::left_out(context, declared, out, &wanted, None, &placed)).collect();
         let in_floors = |fold: &Vec<Sum>, k: &usize| fold[*k].claimed_squares / context.targets[*k].noise.rms.powi(2).max(1e-300);

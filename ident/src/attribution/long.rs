@@ -242,7 +242,7 @@ impl AllRows<'_> {
             refine(self.means, self.declared, &fit.placed, Rows::Where(&seen), heldout::EVALUATIONS)
         };
         let nothing = Held::UNKNOWN;
-        let pooled = heldout::pooled(self.context, self.declared, self.folds, wanted, Some(fit), &shapes).into_iter().enumerate();
+        let pooled = heldout::pooled(self.context, self.declared, self.folds, wanted, fit, &shapes).into_iter().enumerate();
         pooled.map(|(i, e)| e.or(previous.get(i).copied()).unwrap_or(nothing)).collect()
     }
 

@@ -229,7 +229,7 @@ fn of_its_own(context: &Context, declared: Declared<'_>, fit: &Fit, i: usize) ->
     let folds: Vec<Vec<bool>> = (0..5).map(|k| context.t.iter().map(|t| block(*t) == f64::from(k)).collect()).collect();
     let wanted: Vec<bool> = (0..context.targets.len()).map(|k| k == i).collect();
     let shapes = |keep: &[bool]| refine(context, declared, &fit.placed, Rows::Where(keep), heldout::EVALUATIONS);
-    heldout::pooled(context, declared, &folds, &wanted, Some(fit), &shapes)[i].map_or(f64::NAN, |held| held.claimed)
+    heldout::pooled(context, declared, &folds, &wanted, fit, &shapes)[i].map_or(f64::NAN, |held| held.claimed)
 }
 
 /// One entry an effect, the one that helps most first, what has no name last.

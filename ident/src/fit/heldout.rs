@@ -81,12 +81,10 @@ impl Held {
 #[must_use]
 pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec<bool>]) -> Vec<Held> {
     let all = vec![true; context.targets.len()];
-    pooled(context, declared, folds, &all, Some(fit), &|keep| {
-        refine(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS)
-    })
-    .into_iter()
-    .map(|e| e.unwrap_or(Held::UNKNOWN))
-    .collect()
+    pooled(context, declared, folds, &all, fit, &|keep| refine(context, declared, &fit.placed, Rows::Where(keep), EVALUATIONS))
+        .into_iter()
+        .map(|e| e.unwrap_or(Held::UNKNOWN))
+        .collect()
 }
 
 /// What the newest effect does to the held-out errors, by target.
@@ -172,10 +170,10 @@ pub(crate) fn pooled(
     declared: Declared<'_>,
     folds: &[Vec<bool>],
     wanted: &[bool],
-    whole: Option<&Fit>,
+    whole: &Fit,
     refined: &dyn Fn(&[bool]) -> Vec<Placed>,
 ) -> Vec<Option<Held>> {
-    let by_fold: Vec<Vec<Sum>> = folds.iter().map(|out| left_out(context, declared, out, wanted, whole, refined)).collect();
+    let by_fold: Vec<Vec<Sum>> = folds.iter().map(|out| left_out(context, declared, out, wanted, Some(whole), refined)).collect();
     together(context, &by_fold)
 }
 
@@ -186,7 +184,7 @@ pub(crate) fn together(context: &Context, by_fold: &[Vec<Sum>]) -> Vec<Option<He
 }
 
 /// Sums over the rows of one fold, by target, the effects as `refined` gives them for the rows that it may see, about as large as in the `whole`
-/// fit.
+/// fit; of any size without one.
 pub(crate) fn left_out(
     context: &Context,
     declared: Declared<'_>,

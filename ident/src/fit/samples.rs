@@ -65,7 +65,7 @@ pub(crate) struct Samples<'c> {
     /// The same as positions.
     late: Vec<usize>,
     /// The columns of the last design: most of the next one's are the same.
-    known: RefCell<Vec<Product>>,
+    products: RefCell<Vec<Product>>,
 }
 
 /// A column on the samples, and its weighted products.
@@ -127,7 +127,7 @@ impl<'c> Samples<'c> {
             levelled,
             late: (0..unsettled.len()).filter(|i| unsettled[*i]).collect(),
             unsettled,
-            known: RefCell::default(),
+            products: RefCell::default(),
             whole: target.rows.len() == log_rows && !matches!(rows, Rows::Where(_)),
             chosen,
         }
@@ -162,8 +162,8 @@ impl<'c> Samples<'c> {
     /// stood in the last design bring their products along.
     fn equations(&self, design: &TargetDesign) -> (Vec<Values>, [Normal; 2]) {
         let y = self.of_late(&self.y);
-        let mut known = self.known.borrow_mut();
-        let mut last = std::mem::take(&mut *known);
+        let mut products = self.products.borrow_mut();
+        let mut last = std::mem::take(&mut *products);
         for column in &design.columns {
             let old = last.iter().position(|k| Arc::ptr_eq(&k.column, &column.values)).map(|k| last.swap_remove(k));
             let mut own = old.unwrap_or_else(|| {
@@ -180,15 +180,15 @@ impl<'c> Samples<'c> {
                 let new = || [dot(&own.weighted, &other.values), dot(&own.late.1, &other.late.0)];
                 (other.column.clone(), old.map_or_else(new, |o| o.1))
             };
-            own.with_others = known.iter().chain([&own]).map(product).collect();
-            known.push(own);
+            own.with_others = products.iter().chain([&own]).map(product).collect();
+            products.push(own);
         }
-        let products = known.iter().map(|k| (k.with_others.iter().map(|o| o.1[0]), k.with_y));
-        let whole = Normal::of_products(products, self.squares, self.y.len());
-        let products = known.iter().map(|k| (k.with_others.iter().map(|o| o.1[1]), k.late.2));
+        let of_all = products.iter().map(|k| (k.with_others.iter().map(|o| o.1[0]), k.with_y));
+        let whole = Normal::of_products(of_all, self.squares, self.y.len());
+        let of_late = products.iter().map(|k| (k.with_others.iter().map(|o| o.1[1]), k.late.2));
         let squares = self.late.iter().map(|i| self.weights[*i] * self.y[*i] * self.y[*i]).sum();
-        let late = Normal::of_products(products, squares, self.late.len());
-        (known.iter().map(|k| k.values.clone()).collect(), [whole, late])
+        let late = Normal::of_products(of_late, squares, self.late.len());
+        (products.iter().map(|k| k.values.clone()).collect(), [whole, late])
     }
 
     /// A column on the samples.
