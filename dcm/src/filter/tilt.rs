@@ -110,8 +110,8 @@ impl<C: Borrow<Config>> Dcm<C> {
             return;
         }
         let ([x, y, z], k) = (*mean, inverse_sqrt(long));
-        // beyond 90 degrees the sine shrinks again: any turn leads out
-        let by = if z < 0.0 { [-y * k, x * k, 0.0] } else { [0.5, 0.0, 0.0] };
+        // beyond 90 degrees the sine shrinks again: any turn leads out; at 90 one about a mean along x would not
+        let by = if z <= 0.0 { [-y * k, x * k, 0.0] } else { [0.5, 0.0, 0.0] };
         if !self.rest.now {
             self.bias.take_tilt(&config.bias, &by, dt);
         }
@@ -131,5 +131,55 @@ impl<C: Borrow<Config>> Dcm<C> {
         self.heading_absolute |= held;
         self.rest.ever |= step.started;
         step.started
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filter::LowPass;
+
+    /// A filter at level whose averaged force is this one, for so long that nothing moves it.
+    fn averaged(force: Column) -> Dcm {
+        let mut dcm = Dcm::new(Config::DEFAULT);
+        dcm.started = true;
+        dcm.tilt = LowPass { state: [force, ZERO], age: f32::MAX / 4.0 };
+        dcm.config.tilt_tau = f32::MAX / 4.0;
+        dcm.summed = 0.035;
+        dcm
+    }
+
+    /// A mean that lies level is off by a right angle. The turn is about the axis at right angles to it, to where it points up.
+    #[test]
+    fn a_right_angle_is_turned_back() {
+        for force in [[9.0, 0.0, 0.0], [0.0, -9.0, 0.0], [1.0, 0.0, 0.0]] {
+            let mut dcm = averaged(force);
+            dcm.level(&force, &mut Step::default());
+            let [_, _, z] = dcm.tilt.value();
+            let long = root(square(&force));
+            assert!((z / long + 1f32.sin()).abs() < 2e-3, "{force:?}: a turn of one radian, {z}");
+        }
+    }
+
+    #[test]
+    fn a_mean_without_length_turns_nothing() {
+        let mut dcm = averaged([0.9, 0.0, 0.0]);
+        dcm.level(&[0.9, 0.0, 0.0], &mut Step::default());
+        assert_eq!(dcm.matrix, Dcm::new(Config::DEFAULT).matrix);
+    }
+
+    /// Ten degrees: up to there, and not at it, a body at rest is set right slowly.
+    #[test]
+    fn a_tilt_that_is_beyond_doubt_is_set_anew() {
+        let level = (1.0 / (TILT_BEYOND_DOUBT * TILT_BEYOND_DOUBT) - 1.0).sqrt();
+        let set = |force: Column| {
+            let mut dcm = averaged([0.0, 0.0, -9.0]);
+            dcm.rest.ever = true;
+            dcm.rest.force.restart(force);
+            dcm.settle(&mut Step::default())
+        };
+        assert_eq!([0.9 * level, level, 1.1 * level].map(|level| set([level, 0.0, -1.0])), [false, true, true]);
+        assert_eq!([9.0, 20.0].map(|long| set([0.1 * long, 0.0, -long])), [false; 2], "whatever the length");
+        assert_eq!([9.0, 0.1].map(|long| set([0.3 * long, 0.0, -long])), [true; 2], "whatever the length");
     }
 }
