@@ -158,6 +158,68 @@ mod tests {
         assert!(!set_from(&mut found, &[0.0, 0.0, 1.0], &[0.0, 0.0, 3.0]));
     }
 
+    /// The limit itself is no pole yet: roll is told.
+    #[test]
+    fn at_the_edge_of_the_pole_roll_is_still_told() {
+        let r = |north: f32, east: f32| Mat3::new(north, 0.0, 0.0, east, 1.0, 0.0, -1.0, 6e-4, 8e-4);
+        assert_eq!(6e-4f32 * 6e-4 + 8e-4 * 8e-4, POLE);
+        assert!((euler_of(&r(6e-4, 8e-4)).roll - 0.75f32.atan()).abs() < 1e-6);
+        assert_eq!(euler_of(&r(6e-4, 7e-4)).roll, 0.0);
+    }
+
+    /// Of the two quaternions of a half turn the one along its axis.
+    #[test]
+    fn a_half_turn_is_about_its_own_axis() {
+        let turns = [(1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)];
+        for (axis, (x, y, z)) in turns.into_iter().enumerate() {
+            let mut known = [0.0; 4];
+            known[axis + 1] = 1.0;
+            let found = quaternion_of(&Mat3::from_diagonal(&Vec3::new(x, y, z)));
+            assert!(found.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}");
+        }
+    }
+
+    fn heading(column: &Column) -> f32 {
+        column[1].atan2(column[0])
+    }
+
+    /// Starts anew with `up` from an attitude whose columns are given, without a field. The heading of the body axis `kept` stays.
+    fn keeps_the_heading(before: [Column; 3], up: Column, kept: usize) {
+        let mut now = before;
+        assert!(!start_attitude(&mut now, &up, None));
+        let r = Mat3::from(now);
+        assert!((r * r.transpose() - Mat3::identity()).abs().max() < 1e-6, "{r}");
+        let [[x, y, z]] = (r.transpose() * Vec3::new(0.0, 0.0, -1.0)).data.0;
+        assert!((x - up[0]).abs() + (y - up[1]).abs() + (z - up[2]).abs() < 1e-6, "{x} {y} {z}");
+        let (now, before) = (heading(&now[kept]), heading(&before[kept]));
+        assert!((now - before).abs() < 1e-6, "axis {kept}: {now} {before}");
+    }
+
+    /// The columns of an attitude whose body axis `vertical` points down. The next one lies 0.3 rad east of north.
+    fn standing(vertical: usize) -> [Column; 3] {
+        let (s, c) = sin_cos(0.3);
+        let mut columns = [[0.0; 3]; 3];
+        columns[vertical] = [0.0, 0.0, 1.0];
+        columns[(vertical + 1) % 3] = [c, s, 0.0];
+        columns[(vertical + 2) % 3] = [-s, c, 0.0];
+        columns
+    }
+
+    #[test]
+    fn the_first_axis_that_is_level_now_and_before_keeps_its_heading() {
+        let level = matrix_of(&Euler { roll: 0.2, pitch: -0.3, yaw: 2.0 }).data.0;
+        keeps_the_heading(level, [0.48, -0.6, -0.64], 0);
+        keeps_the_heading(standing(0), [0.48, -0.6, -0.64], 1);
+        keeps_the_heading(standing(0), [0.6, 0.48, 0.64], 1);
+        keeps_the_heading(level, [1.0, 0.0, 0.0], 1);
+        keeps_the_heading(level, [-1.0, 0.0, 0.0], 1);
+        // x was vertical and y is now, and the other way round
+        for sign in [1.0, -1.0] {
+            keeps_the_heading(standing(0), [0.0, sign, 0.0], 2);
+            keeps_the_heading(standing(1), [sign, 0.0, 0.0], 2);
+        }
+    }
+
     proptest! {
         #[test]
         fn angles_come_back(roll in -PI..PI, pitch in -1.55f32..1.55, yaw in -PI..PI) {

@@ -229,3 +229,16 @@ fn direction_error(measured: &Vec3, predicted: &Vec3) -> Vec3 {
         .or_else(|| unit(&predicted.cross(&Vec3::y())))
         .unwrap_or_else(Vec3::x)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a field of length 1 a hundredth that is level is not enough.
+    #[test]
+    fn a_field_that_is_nearly_vertical_has_no_heading() {
+        let classic = Classic::new(ClassicConfig::TUNED);
+        assert_eq!(classic.heading_error(&Vec3::new(0.01, 0.0, 1.0)), None);
+        assert!(classic.heading_error(&Vec3::new(0.0, 0.0101, 1.0)).is_some_and(|error| (error + 1.0).abs() < 1e-6));
+    }
+}

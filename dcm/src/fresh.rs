@@ -42,4 +42,11 @@ mod tests {
         let got = [a, a, b, b, b, None, b].map(|m| fresh.take(0.03, m).is_some());
         assert_eq!(got, [true, false, true, false, false, false, true]);
     }
+
+    #[test]
+    fn a_repeat_is_new_as_soon_as_it_is_old() {
+        let mut fresh = Fresh::default();
+        assert_eq!(fresh.take(LONGEST_REPEAT, Some(Vec3::x())), Some(Vec3::x()));
+        assert_eq!(fresh.take(LONGEST_REPEAT, Some(Vec3::x())), Some(Vec3::x()));
+    }
 }

@@ -179,4 +179,44 @@ mod tests {
         assert_eq!(unit(&Vec3::new(f32::INFINITY, 0.0, 1.0)), None);
         assert!((unit(&Vec3::new(0.0, 3.0, -4.0)).unwrap() - Vec3::new(0.0, 0.6, -0.8)).abs().max() < 1e-6);
     }
+
+    /// The ends of what has a direction: their squares are the limits themselves.
+    #[test]
+    fn the_tiny_and_the_huge_have_no_direction() {
+        let big = (1.0 - f32::EPSILON / 2.0) * 2f32.powi(64);
+        let ends = [big, 2f32.powi(52), 0.0];
+        assert_eq!(square(&ends), f32::MAX);
+        assert!(direction(&ends).is_none() && direction(&[big, 0.0, 0.0]).is_some());
+        assert_eq!(square(&[6e-11, 8e-11, 0.0]), 1e-20);
+        assert!(direction(&[6e-11, 8e-11, 0.0]).is_none() && direction(&[6.1e-11, 8e-11, 0.0]).is_some());
+    }
+
+    /// Rows at a wrong angle only, or of a wrong length only: first order would leave more than rounding.
+    #[test]
+    fn any_large_error_of_the_rows_is_taken_out_exactly() {
+        let angled = |sine: f32| [[1.0, 0.0, 0.0], [sine, (1.0 - sine * sine).sqrt(), 0.0]];
+        for [x, y] in [
+            angled(0.11),
+            angled(-0.11),
+            angled(0.6),
+            [[1.1, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            [[0.9, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            [[1.0, 0.0, 0.0], [0.0, 1.1, 0.0]],
+            [[1.0, 0.0, 0.0], [0.0, 0.9, 0.0]],
+        ] {
+            let r = from_rows(&Vec3::from(x), &Vec3::from(y));
+            let found = rotate(&r, &Vec3::zeros(), Increment::Exponential);
+            assert!(orthonormality(&found) < 2e-6, "{x:?} {y:?}: {}", orthonormality(&found));
+        }
+    }
+
+    /// To first order half of the cosine goes to each row; twice its cube is left.
+    #[test]
+    fn up_to_a_hundredth_the_error_is_taken_out_to_first_order() {
+        let half = FIRST_ORDER;
+        let r = from_rows(&Vec3::x(), &Vec3::new(2.0 * half, (1.0 - 4.0 * half * half).sqrt(), 0.0));
+        let found = rotate(&r, &Vec3::zeros(), Increment::FirstOrder);
+        let left = found.row(0).dot(&found.row(1));
+        assert!((left - 2.0 * half.powi(3)).abs() < 0.3e-6, "{left}");
+    }
 }

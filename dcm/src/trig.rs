@@ -72,4 +72,13 @@ mod tests {
             assert!((root(x) - libm::sqrtf(x)).abs() <= 1e-6 * libm::sqrtf(x), "{x}");
         }
     }
+
+    #[test]
+    fn what_is_smaller_than_a_normal_number_has_the_root_zero() {
+        for x in [0.0f32, 1e-40, f32::MIN_POSITIVE / 2.0, -1.0] {
+            assert_eq!(root(x), 0.0, "{x}");
+        }
+        let least = root(f32::MIN_POSITIVE) / 1.084_202_2e-19; // 2^-63
+        assert!((least - 1.0).abs() < 1e-6, "{least}");
+    }
 }

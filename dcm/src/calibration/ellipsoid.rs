@@ -162,3 +162,44 @@ fn row(x: &Vec3, b: &Vec3, w: &Mat3) -> ([f32; 9], f32) {
     ];
     (terms, length - 1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The corners of a box around a centre lie on a sphere.
+    fn corners(centre: Vec3, half: Vec3) -> impl Iterator<Item = Vec3> {
+        let side = |k: u32, bit: u32| if k & bit == 0 { 1.0 } else { -1.0 };
+        (0..8).map(move |k| centre + half.component_mul(&Vec3::new(side(k, 1), side(k, 2), side(k, 4))))
+    }
+
+    #[test]
+    fn the_sphere_through_two_boxes_is_found() {
+        let centre = Vec3::new(0.5, -0.25, 0.75);
+        let points = corners(centre, Vec3::new(1.0, 2.0, 2.0)).chain(corners(centre, Vec3::new(2.0, 2.0, -1.0)));
+        let (b, w) = sphere(points).unwrap();
+        assert!((b - centre).abs().max() < 1e-5, "{b}");
+        assert!((w - Mat3::identity() / 3.0).abs().max() < 1e-5, "{w}");
+    }
+
+    /// The derivatives against differences, far from the ellipsoid.
+    #[test]
+    fn the_derivatives_are_the_slopes() {
+        let (x, b) = (Vec3::new(1.5, -2.0, 0.7), Vec3::new(0.1, 0.3, -0.2));
+        let w = Mat3::new(1.2, 0.2, -0.1, 0.2, 0.8, 0.3, -0.1, 0.3, 1.1);
+        let (slopes, value) = row(&x, &b, &w);
+        let u = w * (x - b);
+        assert!((value - (sqrtf(square(&u)) - 1.0)).abs() < 1e-6);
+        let h = 0.01;
+        for (k, slope) in slopes.into_iter().enumerate() {
+            let moved = |h: f32| {
+                let mut by = [0.0; 9];
+                by[k] = h;
+                let [bx, by, bz, xx, yy, zz, xy, xz, yz] = by;
+                row(&x, &(b + Vec3::new(bx, by, bz)), &(w + Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))).1
+            };
+            let known = (moved(h) - moved(-h)) / (2.0 * h);
+            assert!((slope - known).abs() < 1e-3, "{k}: {slope} {known}");
+        }
+    }
+}

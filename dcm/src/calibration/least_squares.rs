@@ -96,4 +96,35 @@ mod tests {
         }
         assert!(normal.solve().is_none());
     }
+
+    /// A share on top of the diagonal: one unknown becomes as much smaller.
+    #[test]
+    fn damping_shortens_the_step() {
+        let mut normal = Normal::<1>::new();
+        normal.add(&[2.0], 6.0);
+        let step = |share: f32| normal.damped(share).solve().unwrap().x[0];
+        assert!((step(0.0) - 3.0).abs() < 1e-6 && (step(0.5) - 2.0).abs() < 1e-6 && (step(2.0) - 1.0).abs() < 1e-6);
+    }
+
+    /// The standard error of a mean: that of one reading, of n - 1 free ones, over the root of n.
+    #[test]
+    fn a_mean_of_three_has_its_textbook_error() {
+        let mut normal = Normal::<1>::new();
+        [0.0, 1.0, 2.0].iter().for_each(|value| normal.add(&[1.0], *value));
+        let s = normal.solve().unwrap();
+        assert!((s.x[0] - 1.0).abs() < 1e-6 && (s.sigma[0] - (1.0f32 / 3.0).sqrt()).abs() < 1e-6, "{s:?}");
+    }
+
+    /// Two columns that are nearly the same, in any unit.
+    #[test]
+    fn what_the_others_determine_but_for_rounding_has_no_solution() {
+        for unit in [1e-3f32, 1.0, 1e3] {
+            let solved = |apart: f32| {
+                let mut normal = Normal::<2>::new();
+                [1.0, -1.0, 1.0, -1.0].iter().for_each(|sign| normal.add(&[unit, unit * (1.0 + sign * apart)], unit));
+                normal.solve().is_some()
+            };
+            assert!(!solved(5e-4) && solved(5e-3), "{unit}");
+        }
+    }
 }

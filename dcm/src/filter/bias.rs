@@ -92,3 +92,44 @@ impl Words for Bias {
         self.attitude.words(visit);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CONFIG: BiasConfig = crate::Config::DEFAULT.bias;
+    const LEVEL: [Column; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+    /// Of independent measurements the inverse variances add.
+    #[test]
+    fn rest_adds_information_in_proportion_to_its_time() {
+        for variance in [1.0f32, 0.25, 0.01] {
+            for dt in [0.005f32, 0.035, 2.0] {
+                let mut bias = Bias { variance, ..Bias::new() };
+                bias.at_rest(&CONFIG, &[0.1, 0.0, 0.0], dt);
+                let known = 1.0 / variance + dt / CONFIG.rest_weight;
+                assert!((1.0 / bias.variance / known - 1.0).abs() < 1e-5, "{variance} {dt}: {}", bias.variance);
+                let [found, ..] = bias.value;
+                assert!((found - 0.1 * (1.0 - bias.variance / variance)).abs() < 1e-6, "{variance} {dt}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn it_is_trusted_below_its_limit_and_not_at_it() {
+        let bias = |variance: f32| Bias { variance, ..Bias::new() };
+        assert!(bias(0.999 * CONFIG.trusted).trusted(&CONFIG) && !bias(CONFIG.trusted).trusted(&CONFIG));
+    }
+
+    /// A heading error grows the bias about the vertical by its gain; the boost counts by the share that is unknown.
+    #[test]
+    fn a_heading_error_counts_by_what_is_unknown() {
+        for variance in [0.0f32, 0.5, 1.0] {
+            let mut bias = Bias { variance, attitude: LEVEL, ..Bias::new() };
+            bias.take_heading(&CONFIG, 0.1, 0.05);
+            let known = -CONFIG.heading_gain * 0.1 * 0.05 * (1.0 + variance * CONFIG.heading_boost);
+            let [x, y, z] = bias.value;
+            assert!(x == 0.0 && y == 0.0 && (z / known - 1.0).abs() < 1e-5, "{variance}: {z} {known}");
+        }
+    }
+}

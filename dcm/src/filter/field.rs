@@ -168,3 +168,72 @@ impl Words for Field {
         visit(&mut self.frozen);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CONFIG: FieldConfig = crate::Config::DEFAULT.field;
+
+    fn shape(level: f32, down: f32) -> Shape {
+        Shape { level, down }
+    }
+
+    /// A field that is known and believed.
+    fn believed() -> Field {
+        Field { now: shape(20.0, 43.0), reference: shape(20.0, 43.0), good_time: 1.0, ..Field::new() }
+    }
+
+    /// Half of the norm more or less is allowed here: the ends themselves are outside.
+    #[test]
+    fn the_norm_may_differ_by_its_share() {
+        let near = |level: f32| shape(level, 0.0).is_near(&shape(2.0, 0.0), 0.5, 0.1);
+        assert_eq!([1.0, 1.01, 2.0, 2.99, 3.0].map(near), [false, true, true, true, false]);
+    }
+
+    /// The same for the sine of the dip, up to a right angle.
+    #[test]
+    fn the_dip_may_differ_by_its_angle() {
+        let near = |degrees: f32, sine: f32| {
+            let (down, level) = crate::trig::sin_cos(degrees.to_radians());
+            shape(5.0 * level, 5.0 * down).is_near(&shape(5.0, 0.0), 0.1, sine)
+        };
+        assert_eq!([-31.0, -29.0, 0.0, 29.0, 31.0].map(|degrees| near(degrees, 0.5)), [false, true, true, true, false]);
+        assert!(!shape(0.0, 5.0).is_near(&shape(5.0, 0.0), 0.1, 1.0), "a right angle is no less than a right angle");
+    }
+
+    /// The first field is taken as it is; a later one by the share that its time is of time and smoothing together.
+    #[test]
+    fn a_field_is_smoothed_from_the_second_on() {
+        let mut field = Field::new();
+        field.take(&CONFIG, &shape(20.0, 40.0), CONFIG.smoothing, false, false);
+        assert_eq!(field.now, shape(20.0, 40.0));
+        field.take(&CONFIG, &shape(30.0, 60.0), CONFIG.smoothing, false, false);
+        assert_eq!(field.now, shape(25.0, 50.0), "as long as the smoothing: half");
+    }
+
+    #[test]
+    fn a_field_that_has_agreed_for_long_enough_is_not_disturbed() {
+        let agreed = |good_time: f32| Field { good_time, ..Field::new() }.disturbed(&CONFIG);
+        assert!(agreed(0.9 * CONFIG.settle) && !agreed(CONFIG.settle));
+    }
+
+    #[test]
+    fn no_field_has_no_dip_that_is_not_a_number() {
+        let gone = Field { now: shape(0.0, 0.0), ..believed() };
+        let (norm, dip) = gone.against();
+        assert!((norm + 1.0).abs() < 1e-6 && dip.is_finite(), "{norm} {dip}");
+    }
+
+    /// Ten seconds of freezing are given back in five, and no more than that.
+    #[test]
+    fn freezing_is_given_back_twice_as_fast() {
+        let mut field = Field { good_time: 0.0, ..believed() };
+        assert!((0..100).all(|_| field.belief(&CONFIG, 0.1, false) == 0.0), "frozen for ten seconds");
+        field.good_time = 1.0;
+        for (seconds, left) in [(2, 6.0f32), (2, 2.0), (2, 0.0), (2, 0.0)] {
+            assert!((0..10 * seconds).all(|_| field.belief(&CONFIG, 0.1, false) == 1.0), "believed");
+            assert!((field.frozen - left).abs() < 1e-3 && field.frozen >= 0.0, "{} {left}", field.frozen);
+        }
+    }
+}

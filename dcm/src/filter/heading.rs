@@ -96,3 +96,17 @@ fn wrapped(wanted: f32, angle: f32) -> f32 {
     let error = wanted - angle;
     if wanted != 0.0 && error.abs() > PI { error - TAU.copysign(error) } else { error }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::wrapped;
+    use core::f32::consts::{FRAC_PI_2, PI, TAU};
+
+    #[test]
+    fn a_difference_of_angles_goes_the_short_way() {
+        for (wanted, angle, known) in [(3.0, -3.0, 6.0 - TAU), (-3.0, 3.0, TAU - 6.0), (0.5, 0.2, 0.3), (0.0, 3.0, -3.0)] {
+            assert!((wrapped(wanted, angle) - known).abs() < 1e-6, "{wanted} {angle}: {}", wrapped(wanted, angle));
+        }
+        assert_eq!([wrapped(FRAC_PI_2, -FRAC_PI_2), wrapped(-FRAC_PI_2, FRAC_PI_2)], [PI, -PI], "half a turn stays as it is");
+    }
+}

@@ -74,3 +74,53 @@ impl Words for Iron {
         self.found.words(visit);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::columns::ZERO;
+
+    const CONFIG: IronConfig = crate::Config::DEFAULT.iron;
+
+    fn near(a: &Column, b: &Column, far: f32) -> bool {
+        a.iter().zip(b).all(|(a, b)| (a - b).abs() < far)
+    }
+
+    /// What is longer than the dead zone is shortened by it, up to the limit, and taken off.
+    #[test]
+    fn what_is_beyond_the_dead_zone_is_taken_off() {
+        let taken = |found: Column, dead_zone: f32, limit: f32| {
+            Iron { found, ..Iron::default() }.taken_from(&[1.0, 2.0, 3.0], dead_zone, limit)
+        };
+        assert!(near(&taken([0.0, 12.0, 16.0], 5.0, 100.0), &[1.0, 2.0 - 9.0, 3.0 - 12.0], 1e-5), "15 of 20");
+        assert!(near(&taken([0.0, 12.0, 16.0], 5.0, 10.0), &[1.0, 2.0 - 6.0, 3.0 - 8.0], 1e-5), "10 at most");
+        assert_eq!(taken([0.0, 3.0, 0.0], 5.0, 100.0), [1.0, 2.0, 3.0], "within the dead zone");
+        assert_eq!(taken([0.0; 3], 0.0, 100.0), [1.0, 2.0, 3.0], "nothing was found");
+    }
+
+    /// An offset that solves the equations is kept by a step, and any other comes to it.
+    #[test]
+    fn the_solution_of_the_equations_is_where_the_steps_end() {
+        let (doubt, known) = (0.1, [3.0f32, -4.0, 5.0]);
+        let [a, b, c] = [[2.0f32, 0.5, -0.3], [0.5, 1.5, 0.4], [-0.3, 0.4, 1.0]];
+        let mut right = add_scaled(&ZERO, &known, doubt);
+        for (column, offset) in [a, b, c].iter().zip(known) {
+            right = add_scaled(&right, column, offset);
+        }
+        let mut iron = Iron { equations: [a, b, c, right], found: known, ..Iron::default() };
+        iron.solve(doubt);
+        assert!(near(&iron.found, &known, 1e-5), "{:?}", iron.found);
+        iron.found = ZERO;
+        (0..50).for_each(|_| iron.solve(doubt));
+        assert!(near(&iron.found, &known, 1e-4), "{:?}", iron.found);
+    }
+
+    /// Evidence from before counts no more.
+    #[test]
+    fn what_was_forgotten_does_not_come_back() {
+        let mut iron = Iron { equations: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [9.0; 3]], ..Iron::default() };
+        iron.clear();
+        iron.take(&CONFIG, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], &[20.0, 0.0, 43.0], 0.05);
+        assert_eq!(iron.found, ZERO);
+    }
+}

@@ -94,4 +94,10 @@ mod tests {
         }
         assert!((filter.value()[0] - 0.5083).abs() < 2e-3, "{}", filter.value()[0]);
     }
+
+    #[test]
+    fn it_has_started_after_two_time_constants() {
+        let starting = |age: f32| LowPass::<3> { age, ..LowPass::new() }.starting(0.5);
+        assert_eq!([0.5, 0.99, 1.0, 1.5].map(starting), [true, true, false, false]);
+    }
 }
