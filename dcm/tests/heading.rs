@@ -106,19 +106,6 @@ fn a_field_that_is_nearly_vertical_turns_nothing() {
     assert_eq!([0.43, 0.7, 1.0, 2.15].map(used), [false, false, true, true]);
 }
 
-/// A field as strong as the strongest is still a field.
-#[test]
-fn a_magnet_is_stronger_than_the_strongest_field() {
-    let strongest = Config::DEFAULT.field.strongest;
-    let used = |times: f32| {
-        let mut dcm = Dcm::new(Config::default());
-        dcm.update(DT, &body::at_rest(&Mat3::identity(), FIELD));
-        let mag = Some(Vec3::new(strongest * times, 0.0, 0.0));
-        dcm.update(DT, &Measurement { mag, ..Measurement::default() }).mag_used
-    };
-    assert_eq!([0.9, 1.0, 1.1].map(used), [true, true, false]);
-}
-
 /// Nobody learns the first field at rest: whatever the gyro's offset, a body does not turn that rests.
 #[test]
 fn a_bias_is_no_turning() {
@@ -187,4 +174,29 @@ fn a_new_place_leaves_the_heading_what_agrees_with_it() {
         let (anew, known) = (anew.count() as f32 * DT, config.heading_tau * 0.5 * degrees * DEGREE / config.field.dip);
         assert!((anew - known).abs() < 0.2, "{degrees} degrees: {anew} s, {known}");
     }
+}
+
+/// A body at rest whose field differs from the one that is known: its gyro holds the heading better, however long it lasts. In motion the
+/// field is believed by half after a minute.
+#[test]
+fn a_gyro_at_rest_is_believed_more_than_a_strange_field() {
+    let mut body = Turning::new(Config::default(), 60.0);
+    body.go_on(40.0, FIELD);
+    let strange = turned(30.0, 1.4);
+    let (mut moving, mut resting) = (body.dcm, body.dcm);
+    let truth = heading(body.yaw);
+    let mut used = 0;
+    for _ in 0..(100.0 / DT) as u32 {
+        used += u32::from(resting.update(DT, &body::at_rest(&truth, strange)).mag_used);
+    }
+    assert!(resting.flags().rest && resting.flags().field_disturbed && used == 0, "{used}");
+    assert!(resting.heading_against(&truth).abs() < 2.0 * DEGREE, "{}", resting.heading_against(&truth));
+    // a turn below the rate of a new place, so that none is learnt
+    let mut last = Step::default();
+    for k in 0..(70.0 / DT) as u32 {
+        let truth = heading(body.yaw + 10.0 * DT * k as f32);
+        let gyro = Some(Vec3::new(0.0, 0.0, 10.0 * DEGREE));
+        last = moving.update(DT, &Measurement { gyro, ..body::at_rest(&truth, strange) });
+    }
+    assert!(moving.flags().field_disturbed && !moving.flags().rest && last.mag_used, "{:?}", moving.flags());
 }

@@ -173,3 +173,14 @@ fn a_rate_beyond_a_small_range_is_cut() {
     assert!(step.overrange && (dcm.euler().yaw - 0.05).abs() < 1e-4, "{step:?} {}", dcm.euler().yaw);
     assert!(!dcm.update_gyro(0.1, &Vec3::new(0.0, 0.0, 0.49)).overrange);
 }
+
+/// What common chips give at most: 2000 degrees a second and 16 g.
+#[test]
+fn the_ranges_are_those_of_the_chips() {
+    let beyond = |turns: f32, g: f32| {
+        let mut dcm = Dcm::new(Config::default());
+        let gyro = Some(Vec3::new(0.0, turns.to_radians(), 0.0));
+        dcm.update(DT, &Measurement { gyro, accel: Some(Vec3::new(0.0, 0.0, -g * STANDARD_GRAVITY)), mag: None }).overrange
+    };
+    assert_eq!([beyond(1990.0, 1.0), beyond(-2010.0, 1.0), beyond(0.0, 15.9), beyond(0.0, 16.1)], [false, true, false, true]);
+}

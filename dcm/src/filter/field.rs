@@ -212,6 +212,16 @@ mod tests {
         assert_eq!(field.now, shape(25.0, 50.0), "as long as the smoothing: half");
     }
 
+    /// The reference follows with its own time constant what is believed, and what is not yet believed not at all.
+    #[test]
+    fn the_reference_follows_a_field_that_is_believed() {
+        for (good_time, share) in [(1.0, 0.1 / CONFIG.reference_tau), (0.0, 0.0)] {
+            let mut field = Field { now: shape(21.0, 43.0), good_time, ..believed() };
+            field.take(&CONFIG, &shape(21.0, 43.0), 0.1, false, false);
+            assert!((field.reference.level - (20.0 + share)).abs() < 1e-5, "{good_time}: {:?}", field.reference);
+        }
+    }
+
     #[test]
     fn a_field_that_has_agreed_for_long_enough_is_not_disturbed() {
         let agreed = |good_time: f32| Field { good_time, ..Field::new() }.disturbed(&CONFIG);

@@ -99,7 +99,7 @@ fn wrapped(wanted: f32, angle: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::wrapped;
+    use super::*;
     use core::f32::consts::{FRAC_PI_2, PI, TAU};
 
     #[test]
@@ -108,5 +108,20 @@ mod tests {
             assert!((wrapped(wanted, angle) - known).abs() < 1e-6, "{wanted} {angle}: {}", wrapped(wanted, angle));
         }
         assert_eq!([wrapped(FRAC_PI_2, -FRAC_PI_2), wrapped(-FRAC_PI_2, FRAC_PI_2)], [PI, -PI], "half a turn stays as it is");
+    }
+
+    /// A field as strong as the strongest is still a field.
+    #[test]
+    fn a_magnet_is_stronger_than_the_strongest_field() {
+        let magnet = |field: Column| {
+            let mut dcm = Dcm::new(Config::DEFAULT);
+            (dcm.started, dcm.heading_absolute, dcm.since_mag) = (true, true, 0.05);
+            let mut step = Step::default();
+            dcm.mag(&field, &mut step);
+            dcm.heading(&mut step);
+            assert_eq!(step.mag_used, !dcm.magnet);
+            dcm.magnet
+        };
+        assert_eq!([[60.0, 0.0, 79.0], [60.0, 0.0, 80.0], [60.0, 0.0, 81.0]].map(magnet), [false, false, true]);
     }
 }

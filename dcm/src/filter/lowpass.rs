@@ -100,4 +100,14 @@ mod tests {
         let starting = |age: f32| LowPass::<3> { age, ..LowPass::new() }.starting(0.5);
         assert_eq!([0.5, 0.99, 1.0, 1.5].map(starting), [true, true, false, false]);
     }
+
+    /// What a step gives back is the square of the distance to what it has become.
+    #[test]
+    fn a_step_gives_the_distance_that_is_left() {
+        let mut filter = LowPass { state: [[10.0, -4.0, 0.0], [0.0; 3]], age: 9.0 };
+        let square = filter.step(&[13.0, 0.0, 1.0], 0.1, 1.0, 1.0);
+        let [x, y, z] = *filter.value();
+        let known = (13.0 - x).powi(2) + y.powi(2) + (1.0 - z).powi(2);
+        assert!((square - known).abs() < 1e-4 && known > 10.0, "{square} {known}");
+    }
 }
