@@ -317,4 +317,45 @@ mod tests {
         assert_eq!(out.calibrated.mag.unwrap().x, 2.0 * out.read.mag.unwrap().x);
         assert_eq!(out.sample.unwrap().mag, [218, 0, 470]);
     }
+
+    /// A board at rest for so many seconds.
+    fn rested(seconds: u64) -> Ahrs {
+        let mut ahrs = Ahrs::new(AhrsConfig::default());
+        (0..200 * seconds).for_each(|k| {
+            ahrs.tick(&level(Ticks::from_ms(5 * k)));
+        });
+        ahrs
+    }
+
+    /// What the gyro shows at rest is its zero and the filter's bias together: a new zero moves the bias by as much.
+    #[test]
+    fn a_new_zero_of_the_gyro_moves_the_bias() {
+        let mut ahrs = Ahrs::new(AhrsConfig::default());
+        for zero in [Vec3::new(0.02, -0.03, 0.05), Vec3::new(0.05, 0.01, 0.04), Vec3::zeros()] {
+            ahrs.calibrate(&Calibration { gyro_offset: zero, ..Calibration::default() });
+            let sum = ahrs.filter().bias() + zero;
+            assert!(sum.abs().max() < 1e-6, "{sum}");
+        }
+    }
+
+    #[test]
+    fn only_a_new_magnetometer_calibration_makes_the_heading_start_anew() {
+        let mut ahrs = rested(20);
+        assert!(!ahrs.filter().flags().startup);
+        let mut calibration = Calibration { gyro_offset: Vec3::new(0.01, 0.0, 0.0), ..Calibration::default() };
+        ahrs.calibrate(&calibration);
+        assert!(!ahrs.filter().flags().startup, "the gyro's says nothing of the field");
+        calibration.mag_offset.x = 1.0;
+        ahrs.calibrate(&calibration);
+        assert!(ahrs.filter().flags().startup);
+    }
+
+    #[test]
+    fn one_sensor_that_lives_is_something_to_say() {
+        let said = |alive: u8| {
+            let readings = Readings { alive, ..Readings::default() };
+            Ahrs::new(AhrsConfig::default()).tick(&Inputs { now: Ticks(0), readings }).sample.is_some()
+        };
+        assert_eq!([GYRO, ACCEL, MAG, 0, crate::TEST_ACCEL].map(said), [true, true, true, false, false]);
+    }
 }

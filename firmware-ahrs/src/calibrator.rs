@@ -231,3 +231,68 @@ fn attitude(pairs: &mut Attitudes, still: &Still, present: &Calibration) -> Opti
     let count = pairs.len().min(ATTITUDES) as u8;
     Some((None, ImuReport::Taken { sensor: ImuSensor::Alignment, index: count - 1, count }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dcm::Mat3;
+    use dcm::calibration::Alignment;
+
+    #[test]
+    fn every_reason_of_a_fit_is_told_as_it_is() {
+        for (why, told) in [
+            (CalibrationError::TooFew { found: 3, needed: 8 }, ImuRefusal::TooFew { found: 3, needed: 8 }),
+            (CalibrationError::Moving { scatter: 0.5 }, ImuRefusal::Moving { scatter: 0.5 }),
+            (CalibrationError::Coverage { found: 0.25 }, ImuRefusal::Coverage { found: 0.25 }),
+            (CalibrationError::Position { index: 4 }, ImuRefusal::Position { index: 4 }),
+            (CalibrationError::NoFit, ImuRefusal::NoFit),
+        ] {
+            let news = fitted(&Done::Ellipsoid(Err(why), 0), &Calibration::default());
+            assert_eq!(news, Some((None, ImuReport::Refused { sensor: ImuSensor::Mag, why: told })));
+        }
+    }
+
+    /// First what the iron does is taken out, then the axes are turned.
+    #[test]
+    fn an_alignment_turns_what_the_iron_was_taken_from() {
+        let matrix = Mat3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        let found = Alignment { matrix, angle: Vec3::zeros(), sigma: Vec3::zeros(), residual: 0.0 };
+        let mut present = Calibration::default();
+        present.mag_matrix.m11 = 2.0;
+        let Some((Some(right), _)) = fitted(&Done::Alignment(Ok(found), 9), &present) else { panic!() };
+        assert_eq!(right.mag(&Vec3::new(1.0, 3.0, 4.0)), Vec3::new(-3.0, 2.0, 4.0));
+    }
+
+    fn at(force: Vec3, field: Vec3) -> Still {
+        let none = Vec3::zeros();
+        Still { rate: none, rate_sigma: none, rate_noise: 0.0, force, force_sigma: 0.0, field: Some(field), readings: 200 }
+    }
+
+    /// An attitude is a new one where the force or the field has turned by more than 15 degrees.
+    #[test]
+    fn an_attitude_is_taken_once() {
+        let mut pairs = Attitudes::new();
+        let turned = |degrees: f32| Vec3::new(degrees.to_radians().sin(), 0.0, degrees.to_radians().cos());
+        let mut taken = |force: f32, field: f32| {
+            let news = attitude(&mut pairs, &at(turned(force) * 9.8, turned(field) * 48.0), &Calibration::default());
+            news.map(|(_, report)| report)
+        };
+        let told = |index, count| Some(ImuReport::Taken { sensor: ImuSensor::Alignment, index, count });
+        assert_eq!(taken(0.0, 0.0), told(0, 1));
+        assert_eq!(taken(0.0, 0.0), None);
+        assert_eq!(taken(14.0, -14.0), None);
+        assert_eq!(taken(0.0, 17.0), told(1, 2), "another field");
+        assert_eq!(taken(-17.0, 0.0), told(2, 3), "another force");
+    }
+
+    /// Twenty seconds without a rate, and the next tick says what is missing.
+    #[test]
+    fn a_gyro_that_gives_nothing_is_refused_after_its_time() {
+        let mut calibrator = Calibrator::default();
+        calibrator.begin(ImuSensor::Gyro);
+        let mut tick = || calibrator.take(&Outputs::default(), &Calibration::default());
+        assert!((0..20 * TICK_HZ).all(|_| tick().is_none()));
+        let why = ImuRefusal::TooFew { found: 0, needed: 200 };
+        assert_eq!(tick(), Some((None, ImuReport::Refused { sensor: ImuSensor::Gyro, why })));
+    }
+}

@@ -225,4 +225,40 @@ mod tests {
             prop_assert_eq!(heard(&mut line, b"save\n"), [Heard::Command(Command::Imu(ImuCommand::Save))]);
         }
     }
+
+    #[test]
+    fn every_word_of_the_manual_is_its_command() {
+        for (words, known) in [
+            ("ping", Command::Ping),
+            ("identify", Command::Identify),
+            ("format text", Command::Imu(ImuCommand::Format(ImuFormat::Text))),
+            ("format binary", Command::Imu(ImuCommand::Format(ImuFormat::Binary))),
+            ("stream on", Command::Imu(ImuCommand::Stream(true))),
+            ("stream off", Command::Imu(ImuCommand::Stream(false))),
+            ("cancel", Command::Imu(ImuCommand::Cancel)),
+        ] {
+            assert_eq!(command(words), Some(known), "{words}");
+        }
+    }
+
+    /// What does not fit is no command, even where its beginning is one.
+    #[test]
+    fn a_line_that_is_too_long_is_none_whatever_it_begins_with() {
+        let mut line = CommandLine::new();
+        assert_eq!(heard(&mut line, b"once"), []);
+        assert_eq!(heard(&mut line, &[b' '; LONGEST]), []);
+        assert_eq!(heard(&mut line, b"\n"), [Heard::Unknown]);
+    }
+
+    #[test]
+    fn a_damaged_frame_is_counted() {
+        let mut line = CommandLine::new();
+        let mut wire = framed(Ticks(1), Command::Identify);
+        let middle = wire.len() / 2;
+        wire[middle] ^= 0x40;
+        assert_eq!(heard(&mut line, &wire), []);
+        assert_eq!(line.damaged(), 1);
+        assert_eq!(heard(&mut line, &framed(Ticks(2), Command::Ping)), [Heard::Command(Command::Ping)]);
+        assert_eq!(line.damaged(), 1);
+    }
 }

@@ -162,4 +162,42 @@ mod tests {
         assert!(matches!(second(|_| 0.0, |k| k as f32 * 1e-3, |_| 43.0), Second::Motion(_)), "a slow tilt");
         assert!(matches!(second(|_| 0.0, |_| 0.0, |k| k as f32 * 0.02), Second::Motion(_)), "a slow turn about the vertical");
     }
+
+    /// How many instants a second takes where only every so many bring a rate or a force.
+    fn instants(rates: u32, forces: u32) -> u32 {
+        let mut watch = Watch::default();
+        let full = |k: &u32| {
+            let gyro = k.is_multiple_of(rates).then(Vec3::zeros);
+            let accel = k.is_multiple_of(forces).then(|| Vec3::new(0.0, 0.0, -9.8));
+            watch.take(&Measurement { gyro, accel, mag: None }).is_some()
+        };
+        (1..1_000).find(full).unwrap_or(0)
+    }
+
+    #[test]
+    fn a_second_has_two_hundred_rates_and_as_many_forces() {
+        assert_eq!([instants(1, 1), instants(2, 1), instants(1, 2)], [200, 400, 400]);
+    }
+
+    #[test]
+    fn the_noise_of_a_second_is_that_of_a_reading() {
+        let rate = |k: u32| if k.is_multiple_of(2) { 0.01 } else { -0.01 };
+        let Second::Rest(still) = second(rate, |_| 0.0, |_| 43.0) else { panic!() };
+        assert!((still.rate_noise - 0.01).abs() < 1e-4, "{}", still.rate_noise);
+    }
+
+    #[test]
+    fn rates_are_counted() {
+        let mut watch = Watch::default();
+        for k in 1..5 {
+            watch.take(&Measurement { gyro: Some(Vec3::zeros()), ..Measurement::default() });
+            assert_eq!(watch.readings(), k);
+        }
+    }
+
+    /// From half a step on noise averages out; below, the step hides it.
+    #[test]
+    fn half_a_step_of_noise_averages_out() {
+        assert_eq!([error_of_mean(0.5, 100, 1.0), error_of_mean(0.49, 100, 1.0)], [0.05, STEP]);
+    }
 }

@@ -275,4 +275,46 @@ mod tests {
         assert!(line(&Message::Event(Event::Refused(frame::Refusals(u16::MAX)))).is_none_or(|l| l.len() <= LINE));
         assert_eq!(line(&Message::Health(frame::message::Health::default())), None);
     }
+
+    /// Roll, pitch and yaw that a raw line ends with.
+    fn told(e: &dcm::Euler) -> [f32; 3] {
+        let q = dcm::quaternion_of(&dcm::matrix_of(e)).map(|q| (q * 1_073_741_824.0) as i32);
+        let line = line(&Message::Imu(ImuSample { quaternion_q30: q, ..ImuSample::default() })).unwrap();
+        let mut last = line.trim().rsplit(',').map(|word| word.parse().unwrap());
+        let [yaw, pitch, roll] = [(); 3].map(|()| last.next().unwrap());
+        [roll, pitch, yaw]
+    }
+
+    #[test]
+    fn the_angles_of_a_line_are_those_of_the_attitude() {
+        for [roll, pitch, yaw] in [[10.0, 20.0, 30.0], [-100.0, -50.0, 170.0], [75.0, 5.0, -120.0], [-20.0, 70.0, 0.0]] {
+            let found =
+                told(&dcm::Euler { roll: f32::to_radians(roll), pitch: f32::to_radians(pitch), yaw: f32::to_radians(yaw) });
+            let known = [roll, pitch, yaw];
+            assert!(found.iter().zip(known).all(|(a, b)| (a - b).abs() < 0.02), "{found:?} {known:?}");
+        }
+        // at the pole roll is none of its own: yaw less roll, or both together
+        for (pitch, yaw) in [(90.0f32, 20.0), (-90.0, 60.0)] {
+            let found = told(&dcm::Euler { roll: 20f32.to_radians(), pitch: pitch.to_radians(), yaw: 40f32.to_radians() });
+            assert!(found[0] == 0.0 && (found[1] - pitch).abs() < 0.05 && (found[2] - yaw).abs() < 0.05, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn answers_are_told_in_words() {
+        let hello = frame::Hello { present: 0b1010, firmware: [1, 2, 3], ..crate::Ahrs::hello(168_000_000, 0, 0) };
+        assert_eq!(line(&Message::Hello(hello)).unwrap(), "imu board, firmware 1.2.3, sensors accel test\n");
+        let test = frame::TestAccel { at: Ticks::from_ms(2_005), words: [1, -2, 3] };
+        assert_eq!(line(&Message::TestAccel(test)).unwrap(), "test,2.005,1,-2,3\n");
+        assert_eq!(line(&Message::Event(Event::Accepted)).unwrap(), "ok\n");
+        let refused = line(&Message::Event(Event::Refused(frame::Refusals(frame::Refusals::WRONG_STATE)))).unwrap();
+        assert!(refused.starts_with("refused: ") && refused.ends_with(";\n"), "{refused}");
+        assert_eq!(line(&Message::Event(Event::Settings(SettingsNews::Saved))).unwrap(), "settings: saved\n");
+        for (sensor, name) in
+            [(ImuSensor::Gyro, "gyro"), (ImuSensor::Accel, "accel"), (ImuSensor::Mag, "mag"), (ImuSensor::Alignment, "align")]
+        {
+            let report = ImuReport::Taken { sensor, index: 2, count: 3 };
+            assert_eq!(line(&Message::ImuReport(report)).unwrap().as_str(), std::format!("{name}: taken 2, 3 so far\n"));
+        }
+    }
 }
