@@ -358,4 +358,9 @@ mod tests {
         };
         assert_eq!([GYRO, ACCEL, MAG, 0, crate::TEST_ACCEL].map(said), [true, true, true, false, false]);
     }
+
+    #[test]
+    fn as_many_ticks_as_are_named_are_a_second() {
+        assert_eq!(NOMINAL.0 * u64::from(TICK_HZ), Ticks::from_ms(1000).0);
+    }
 }

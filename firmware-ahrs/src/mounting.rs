@@ -102,4 +102,10 @@ mod tests {
     fn the_lowest_word_stays_at_the_rail() {
         assert_eq!(Mounting::FLAT.to_body([i16::MIN; 3]), [i16::MIN, i16::MAX, i16::MAX]);
     }
+
+    #[test]
+    fn a_board_turned_about_the_vertical_has_x_and_y_backwards() {
+        let turned = Mounting::new([Axis::NegX, Axis::NegY, Axis::PosZ]).unwrap();
+        assert_eq!(turned.to_body([1, 2, 3]), [-1, -2, 3]);
+    }
 }

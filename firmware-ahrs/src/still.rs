@@ -200,4 +200,20 @@ mod tests {
     fn half_a_step_of_noise_averages_out() {
         assert_eq!([error_of_mean(0.5, 100, 1.0), error_of_mean(0.49, 100, 1.0)], [0.05, STEP]);
     }
+
+    /// What has changed by as much as is allowed is still rest.
+    #[test]
+    fn the_halves_may_differ_by_so_much() {
+        let halves = |by: f32| move |k: u32| if k < 100 { 0.0 } else { by };
+        let rests = |force: f32, field: f32| matches!(second(|_| 0.0, halves(force), halves(field)), Second::Rest(_));
+        assert_eq!([rests(FORCE_MOVED, FIELD_MOVED), rests(0.051, 0.0), rests(0.0, 1.01)], [true, false, false]);
+    }
+
+    #[test]
+    fn rest_without_a_magnetometer_has_no_field() {
+        let mut watch = Watch::default();
+        let read = Measurement { gyro: Some(Vec3::zeros()), accel: Some(Vec3::new(0.0, 0.0, -9.8)), mag: None };
+        let found = (0..200).find_map(|_| watch.take(&read));
+        assert!(matches!(found, Some(Second::Rest(Still { field: None, .. }))), "{found:?}");
+    }
 }
