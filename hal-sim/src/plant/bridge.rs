@@ -11,6 +11,8 @@ use super::meter::{Meter, MeterState};
 
 /// Share of a change of load that the joint's friction holds back until it slips (assumed).
 const JOINT_SHARE: f64 = 0.3;
+/// Time over which the joint feels the load, s (assumed): several turns, so that the shaking of one does not narrow its loop.
+const JOINT_S: f64 = 0.05;
 /// Standard gravity, m/s^2.
 const G: f64 = 9.806_65;
 
@@ -37,7 +39,7 @@ pub struct Bridge {
     pub creep_share: f64,
     /// Time constant of the creep, s.
     pub creep_s: f64,
-    /// Width of the loop between rising and falling load, N: dry friction in the joint of the beam.
+    /// Width of the loop of the readings between rising and falling load, N: dry friction in the joint of the beam.
     pub hysteresis_n: f64,
     /// Digital meter ahead of the ADC.
     pub meter: Meter,
@@ -91,6 +93,8 @@ pub struct BridgeState {
     bridge: Bridge,
     creep_n: f64,
     lift_n: f64,
+    /// Load as the joint feels it, N.
+    joint_n: f64,
     stuck_n: f64,
     output_v: f64,
     pin_v: f64,
@@ -99,6 +103,7 @@ pub struct BridgeState {
     fall: f64,
     filter: f64,
     creep: f64,
+    joint: f64,
     /// Amplifier output of the beam with nothing but the motor on it, V.
     empty_v: f64,
 }
@@ -145,6 +150,7 @@ impl BridgeState {
             bridge,
             creep_n: 0.0,
             lift_n: 0.0,
+            joint_n: 0.0,
             stuck_n: 0.0,
             meter: MeterState::new(bridge.meter, bridge.resting_v(), dt_s),
             output_v,
@@ -153,6 +159,7 @@ impl BridgeState {
             fall: share(dt_s, bridge.fall_s),
             filter: share(dt_s, bridge.filter_s),
             creep: share(dt_s, bridge.creep_s),
+            joint: share(dt_s, JOINT_S),
             empty_v: bridge.resting_v() / bridge.divider,
         }
     }
@@ -165,6 +172,8 @@ impl BridgeState {
         *self = Self {
             creep_n: self.creep_n,
             lift_n: self.lift_n,
+            // a joint that begins to stick has felt the load all along
+            joint_n: if self.bridge.hysteresis_n == 0.0 { self.lift_n } else { self.joint_n },
             stuck_n: self.stuck_n,
             output_v: self.output_v,
             pin_v: self.pin_v,
@@ -185,7 +194,9 @@ impl BridgeState {
         if b.hysteresis_n != 0.0 || self.stuck_n != 0.0 {
             // A slider in the joint holds back a share of each change of load until it slips (Jenkins element).
             let half = 0.5 * b.hysteresis_n;
-            self.stuck_n = (self.stuck_n + JOINT_SHARE * (lift_n - self.lift_n)).clamp(-half, half);
+            let change_n = (lift_n - self.joint_n) * self.joint;
+            self.joint_n += change_n;
+            self.stuck_n = (self.stuck_n + JOINT_SHARE * change_n).clamp(-half, half);
             seen_n -= self.stuck_n;
         }
         self.lift_n = lift_n;
@@ -312,12 +323,24 @@ mod tests {
     fn friction_in_the_joint_opens_a_loop_of_its_width() {
         let b = Bridge { hysteresis_n: 0.1, ..Bridge::default() };
         let mut s = BridgeState::new(b, 1.0e-3);
+        // a turn takes 10 ms, and shakes the beam by more than the loop is wide
         let mut read = |lift: f64| {
-            let v = (0..200).map(|_| s.step(lift, 0.0, 1.0, 23.0)).last().unwrap();
-            (v - b.resting_v()) * b.newton_per_volt()
+            let turn = |ms: i32| 0.2 * libm::cos(0.2 * core::f64::consts::PI * f64::from(ms));
+            let v: Vec<f64> = (0..1000).map(|ms| s.step(lift + turn(ms), 0.0, 1.0, 23.0)).collect();
+            let mean = v[500..].iter().sum::<f64>() / 500.0;
+            (mean - b.resting_v()) * b.newton_per_volt()
         };
         let up: Vec<f64> = (0..=10).map(|i| read(f64::from(i) * 0.4)).collect();
         let down: Vec<f64> = (0..=10).rev().map(|i| read(f64::from(i) * 0.4)).collect();
-        assert!((down[5] - up[5] - 0.1).abs() < 1e-9, "{} {}", up[5], down[5]);
+        assert!((down[5] - up[5] - 0.1).abs() < 0.005, "{} {}", up[5], down[5]);
+    }
+
+    #[test]
+    fn a_joint_that_begins_to_stick_does_not_jump() {
+        let mut s = BridgeState::new(Bridge::default(), 1.0e-3);
+        let before = (0..1000).map(|_| s.step(3.0, 0.0, 1.0, 23.0)).last().unwrap();
+        s.refit(Bridge { hysteresis_n: 0.1, ..Bridge::default() }, 1.0e-3);
+        let after = (0..1000).map(|_| s.step(3.0, 0.0, 1.0, 23.0)).last().unwrap();
+        assert!((after - before).abs() < 1e-9, "{before} {after}");
     }
 }
