@@ -8,6 +8,7 @@
 use crate::parts::BenchParts;
 use super::Effect;
 use crate::noise::Stream;
+use crate::plant::rig_plant::ESC_IDLE_A;
 use serde::{Deserialize, Serialize};
 
 /// Parameters.
@@ -27,7 +28,8 @@ impl Effect for CurrentLimit {
     }
 
     fn fit(&self, parts: &mut BenchParts) {
-        parts.plant.limiter.current_a = self.limit_a;
+        // what the supply gives, the ESC's own draw included, is what the limit holds and a meter reads
+        parts.plant.limiter.current_a = self.limit_a - ESC_IDLE_A;
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64, &'static str)> {

@@ -21,7 +21,7 @@ use core::f64::consts::TAU;
 /// rev/min in one rad/s.
 pub const RPM_PER_RAD_S: f64 = 60.0 / TAU;
 /// Draw of the ESC's own electronics, A.
-const ESC_IDLE_A: f64 = 0.03;
+pub(crate) const ESC_IDLE_A: f64 = 0.03;
 
 /// What is constant for a millisecond: everything that heats, drains, drifts or blows.
 #[derive(Debug, Clone, Copy, Default)]
