@@ -37,6 +37,7 @@ impl Effect for BladeFlex {
     }
 
     fn parameters(&self) -> Vec<(&'static str, f64, &'static str)> {
-        vec![("onset", self.onset_rpm, "rpm"), ("loss", self.loss, "1"), ("exponent", self.exponent, "1")]
+        // a verdict's `exponent` is one of the speed, this one of the speed's excess
+        vec![("onset", self.onset_rpm, "rpm"), ("loss", self.loss, "1"), ("excess_exponent", self.exponent, "1")]
     }
 }
