@@ -1,7 +1,7 @@
 //! `quantisation`: a channel resolves only coarse steps.
 //!
 //! What it is: the reading is the nearest multiple of `step`; the departure from the truth is a saw-tooth of the truth. Where noise comes after the
-//! rounding no reading lies on the grid, but all gather about it ([`beneath_noise`]); against a declared model that form is asked too.
+//! rounding no reading lies on the grid, but all gather about it ([`beneath_noise`]).
 //! What can go wrong: noise as large as the step smears the saw-tooth out, and nothing is offered then.
 //! Units: the channel's.
 //! Reference: Widrow & Kollar 2008, *Quantization Noise*.
@@ -13,6 +13,8 @@ use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, In
 use crate::numeric::solve::Normal;
 
 mod beneath_noise;
+
+use beneath_noise::Grid;
 
 /// See the module.
 pub(crate) struct Quantisation;
@@ -50,7 +52,7 @@ impl Effect for Quantisation {
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let rounds = |t: &&Target| matches!(t.relation, Relation::Thrust | Relation::Torque | Relation::Current);
-        let beneath = |t: &Target| context.against_model && beneath_noise::grid(context, t).is_some();
+        let beneath = |t: &Target| beneath_noise::grid(context, t).is_some();
         let seen = |t: &Target| {
             let form = if step(t).is_some() { Some("") } else { beneath(t).then_some(BENEATH) };
             form.map(|form| Instance::new(&[t.name], form))
@@ -66,6 +68,10 @@ impl Effect for Quantisation {
             return vec![of("step", target.and_then(step).unwrap_or(0.0))];
         }
         let (step, offset) = target.and_then(|t| beneath_noise::grid(context, t)).map_or((0.0, 0.0), |g| (g.step, g.offset));
+        // a relation that is fitted to these readings has their zero
+        if !context.against_model {
+            return vec![of("step", step), of("offset", offset)];
+        }
         // by how much the zero is another one than the model's: a level that falls on the wrong side of an edge is off by a whole step
         let zero = Shape {
             name: "zero",
@@ -91,18 +97,37 @@ impl Effect for Quantisation {
 
     fn apply(&self, context: &Context, instance: &Instance, shape: &[f64], position: usize, design: &mut TargetDesign) {
         let Some(target) = context.targets.iter().find(|t| instance.touches(t.name)) else { return };
-        if let [step, offset, zero] = shape {
+        if let [step, offset, zero @ ..] = shape {
+            if *step <= 0.0 {
+                return;
+            }
+            let zero = zero.first().copied().unwrap_or(0.0);
             // a declared model knows the truth but for the zero of the day; an edge is as sharp as that is known
-            let (Some(known), true) = (design.known(), *step > 0.0) else { return };
+            let grid = Grid { step: *step, offset: *offset };
+            let Some(truth) = design.known().or_else(|| within_lines(context, target, design, &grid)) else { return };
             let edge = EDGE * target.noise.rms / step;
             let read = |v: &f64| step * round((v + zero - offset) / step, edge) + offset;
-            design.add(position, 0, known.iter().map(|v| read(v) - v).collect());
+            design.add(position, 0, truth.iter().map(|v| read(v) - v).collect());
         } else if let [step] = shape
             && *step > 0.0
             && let Some(truth) = within_steps(context, target, design, *step)
         {
             design.add(position, 0, truth.iter().map(|v| step * (v / step).round() - v).collect());
         }
+    }
+
+    /// Step and offset are read off: no likelihood knows their errors.
+    fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
+        let noise = context.targets.iter().find(|t| instance.touches(t.name)).map_or(f64::NAN, |t| t.noise.rms);
+        let of_levels = noise / (context.steady.len().max(1) as f64).sqrt();
+        for e in fitted.iter_mut().filter(|_| instance.form == BENEATH && !context.against_model) {
+            match e.name.as_str() {
+                "step" => e.se = 1e-3 * e.value,
+                "offset" => e.se = of_levels,
+                _ => {}
+            }
+        }
+        fitted
     }
 
     fn plausible(&self, _: &Context, _: &Instance, fitted: &[Estimate]) -> bool {
@@ -113,6 +138,9 @@ impl Effect for Quantisation {
 /// Part of the noise within which a truth is known where noise comes after the rounding: a level within that of an edge may be on either side.
 const EDGE: f64 = 0.3;
 
+/// Widths of an edge from which on a level is on one side of it: there the way across is done to one part in 400.
+const CLEAR: f64 = 3.0;
+
 /// The nearest whole number, or on an edge of some width what lies between the two.
 fn round(v: f64, edge: f64) -> f64 {
     let whole = v.floor();
@@ -122,51 +150,91 @@ fn round(v: f64, edge: f64) -> f64 {
 /// Form in which noise comes after the rounding, so that no reading lies on the grid.
 const BENEATH: &str = "beneath the noise";
 
-/// The truth as the relation's own columns give it, moved until each reading is its rounding wherever they can: the readings
-/// are replaced by what is nearest to the fit within half a step of them, and the fit is made again.
-///
-/// Reference: projections onto convex sets, Combettes 1993, Proceedings of the IEEE 81:182.
+/// The truth as the relation's own columns give it, moved until each reading is its rounding wherever they can.
 fn within_steps(context: &Context, target: &Target, design: &TargetDesign, step: f64) -> Option<Vec<f64>> {
-    let width = design.columns.len();
-    if width == 0 {
-        return Some(design.predict(&[], context.len()));
-    }
     let stride = target.y.len().div_ceil(SAMPLES).max(1);
-    let sampled = || target.rows.iter().step_by(stride);
-    let readings: Vec<f64> = target.y.iter().copied().step_by(stride).collect();
-    let known: Vec<f64> = sampled().map(|i| design.fixed.get(*i).copied().unwrap_or(0.0)).collect();
-    // the columns of all samples one after the other, sample by sample: the rounds differ in the readings only
-    let rows: Vec<f64> = sampled().flat_map(|i| design.columns.iter().map(|c| c.values[*i])).collect();
-    let mut normal = Normal::new(width);
-    rows.chunks_exact(width).for_each(|row| normal.add(row, 0.0, 1.0));
-    let factor = normal.factor()?;
-    let mut nearest = readings.clone();
-    let mut coefficients = Vec::new();
-    let mut projections = vec![0.0; width];
-    for _ in 0..PROJECTIONS {
-        projections.fill(0.0);
-        for (row, (y, known)) in rows.chunks_exact(width).zip(nearest.iter().zip(&known)) {
-            projections.iter_mut().zip(row).for_each(|(p, v)| *p += v * (y - known));
+    let rows = || target.rows.iter().step_by(stride);
+    let samples = Samples {
+        columns: rows().flat_map(|i| design.columns.iter().map(|c| c.values[*i])).collect(),
+        known: rows().map(|i| design.fixed.get(*i).copied().unwrap_or(0.0)).collect(),
+        readings: target.y.iter().copied().step_by(stride).collect(),
+    };
+    Some(design.predict(&samples.moved_into(0.5 * step, design.columns.len(), PROJECTIONS)?, context.len()))
+}
+
+/// The same where noise comes after the rounding: each level is a sample, and reads the line of the grid that it lies by.
+fn within_lines(context: &Context, target: &Target, design: &TargetDesign, grid: &Grid) -> Option<Vec<f64>> {
+    let mut samples = Samples::default();
+    for (from, to) in &context.steady {
+        let at = target.rows.partition_point(|row| row < from)..target.rows.partition_point(|row| row < to);
+        let (Some(rows), Some(y)) = (target.rows.get(at.clone()), target.y.get(at)) else { continue };
+        if rows.is_empty() {
+            continue;
         }
-        coefficients = factor.solve(&projections)?;
-        let mut moved = 0.0_f64;
-        for ((row, known), (y, z)) in rows.chunks_exact(width).zip(&known).zip(readings.iter().zip(&mut nearest)) {
-            let truth = row.iter().zip(&coefficients).fold(0.0, |sum, (v, c)| sum + c * v) + known;
-            let next = truth.clamp(y - 0.5 * step, y + 0.5 * step);
-            moved = moved.max((next - *z).abs());
-            *z = next;
-        }
-        if moved < 1e-3 * step {
-            break;
-        }
+        let mean = |values: &[f64]| rows.iter().filter_map(|row| values.get(*row)).sum::<f64>() / rows.len() as f64;
+        samples.columns.extend(design.columns.iter().map(|c| mean(&c.values)));
+        samples.known.push(mean(&design.fixed));
+        samples.readings.push(grid.line(y.iter().sum::<f64>() / y.len() as f64));
     }
-    Some(design.predict(&coefficients, context.len()))
+    // on an edge a level would read what lies between two lines
+    let half = (0.5 * grid.step - CLEAR * EDGE * target.noise.rms).max(0.0);
+    Some(design.predict(&samples.moved_into(half, design.columns.len(), OF_LEVELS)?, context.len()))
+}
+
+/// What says where the truth lies.
+#[derive(Default)]
+struct Samples {
+    /// The columns of all samples one after the other, sample by sample.
+    columns: Vec<f64>,
+    /// What is known of each without them.
+    known: Vec<f64>,
+    /// What each reads.
+    readings: Vec<f64>,
+}
+
+impl Samples {
+    /// Coefficients of the columns, with which each reading is the rounding of the truth wherever they can: the readings are replaced by what is nearest to
+    /// the fit within `half` of them, half a step, and the fit is made again.
+    ///
+    /// Reference: projections onto convex sets, Combettes 1993, Proceedings of the IEEE 81:182.
+    fn moved_into(&self, half: f64, width: usize, rounds: usize) -> Option<Vec<f64>> {
+        if width == 0 {
+            return Some(Vec::new());
+        }
+        let mut normal = Normal::new(width);
+        self.columns.chunks_exact(width).for_each(|row| normal.add(row, 0.0, 1.0));
+        let factor = normal.factor()?;
+        let mut nearest = self.readings.clone();
+        let mut coefficients = Vec::new();
+        let mut projections = vec![0.0; width];
+        for _ in 0..rounds {
+            projections.fill(0.0);
+            for (row, (y, known)) in self.columns.chunks_exact(width).zip(nearest.iter().zip(&self.known)) {
+                projections.iter_mut().zip(row).for_each(|(p, v)| *p += v * (y - known));
+            }
+            coefficients = factor.solve(&projections)?;
+            let mut moved = 0.0_f64;
+            let samples = self.columns.chunks_exact(width).zip(&self.known).zip(self.readings.iter().zip(&mut nearest));
+            for ((row, known), (y, z)) in samples {
+                let truth = row.iter().zip(&coefficients).fold(0.0, |sum, (v, c)| sum + c * v) + known;
+                let next = truth.clamp(y - half, y + half);
+                moved = moved.max((next - *z).abs());
+                *z = next;
+            }
+            if moved < 2e-3 * half {
+                break;
+            }
+        }
+        Some(coefficients)
+    }
 }
 
 /// Samples that say where the truth lies.
 const SAMPLES: usize = 1000;
 /// Most rounds of moving the truth into the steps.
 const PROJECTIONS: usize = 30;
+/// The same where a sample is a level: a run has some tens of them.
+const OF_LEVELS: usize = 1000;
 
 /// Share of readings that repeat the one before where rounding makes three times the error of what noise there is: noise of a tenth of a step
 /// crosses an edge on every ninth row (the mean distance of two readings, 1.13 standard deviations, over the step).

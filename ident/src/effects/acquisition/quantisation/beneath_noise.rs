@@ -4,9 +4,17 @@
 //! What can go wrong: a run that holds few levels has readings that gather somewhere by chance; whether they are roundings of what the relation
 //! expects is not asked here. Noise above a sixth of the step leaves no grid to see.
 //! Units: the channel's.
-//! Reference: directional statistics, Mardia & Jupp 2000, section 5.2.
+//! Reference: directional statistics, Mardia & Jupp 2000, section 5.2; Rayleigh's test, section 6.3.
 
 use crate::channel::{Context, Target};
+use crate::effects::NEEDED_EVIDENCE;
+
+impl Grid {
+    /// The line that a reading lies nearest to.
+    pub(super) fn line(&self, reading: f64) -> f64 {
+        self.step * ((reading - self.offset) / self.step).round() + self.offset
+    }
+}
 
 /// A grid: multiples of `step` from `offset` on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +60,27 @@ pub(super) fn grid(context: &Context, target: &Target) -> Option<Grid> {
     };
     let (coarse, ..) = best(&mut (0..=trials).map(|k| (FEWEST + k as f64 / FINE) / span))?;
     let (frequency, strength, phase) = best(&mut (-FINER.0..=FINER.0).map(|k| coarse + f64::from(k) / (FINER.1 * FINE * span)))?;
-    (strength > GATHERED).then(|| Grid { step: 1.0 / frequency, offset: phase / frequency })
+    let grid = (strength > GATHERED).then(|| Grid { step: 1.0 / frequency, offset: phase / frequency })?;
+    // a declared model says where each level ought to lie; without one the levels alone must say that they are no chance. Of the trials one in FINE is
+    // independent, so that the finer ones add none
+    let tried = (trials + 1) as f64;
+    (context.against_model || beyond_chance(context, target, &grid) - tried.ln() > NEEDED_EVIDENCE).then_some(grid)
+}
+
+/// How much rarer than by chance the levels of a run gather about the lines of a grid, nats: of each line that any level lies by, one level counts.
+fn beyond_chance(context: &Context, target: &Target, grid: &Grid) -> f64 {
+    let of_rows = |(from, to): &(usize, usize)| {
+        let first = target.rows.partition_point(|row| row < from);
+        let last = target.rows.partition_point(|row| row < to);
+        let level = target.y.get(first..last).filter(|level| !level.is_empty())?;
+        Some(level.iter().sum::<f64>() / level.len() as f64)
+    };
+    let mut levels: Vec<f64> = context.steady.iter().filter_map(of_rows).collect();
+    levels.sort_unstable_by(f64::total_cmp);
+    levels.dedup_by(|b, a| *b - *a < 0.5 * grid.step);
+    // Rayleigh's test
+    let (gathered, _) = gather(&levels, 1.0 / grid.step);
+    levels.len() as f64 * gathered.powi(2)
 }
 
 /// How closely readings gather about multiples of a spacing, 0 to 1, and by which share of it they lie above those.
