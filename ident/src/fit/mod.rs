@@ -198,6 +198,24 @@ pub fn fit(context: &Context, declared: Declared<'_>, placed: &[Placed], rest: O
     Some(Fit { placed: placed.to_vec(), targets })
 }
 
+/// An amplitude with a shape a standard error higher, and lower.
+struct Moved {
+    up: f64,
+    down: f64,
+}
+
+/// Standard errors from nothing at which an amplitude has its sign for sure: a hundredth more than an interval of 95 % holds.
+const SIGNED: f64 = 2.0;
+
+impl Moved {
+    /// The standard error of an amplitude that this shape widens.
+    fn widen(&self, e: &Estimate) -> f64 {
+        let all = e.se.hypot(0.5 * (self.up - self.down));
+        let signed = e.value.abs() >= SIGNED * e.se && [self.up, self.down].iter().all(|moved| moved * e.value > 0.0);
+        if signed { all.min(e.value.abs() / SIGNED) } else { all }
+    }
+}
+
 /// Whether every shape lies within its range, and every effect makes physical sense.
 pub(crate) fn plausible(context: &Context, declared: Declared<'_>, fit: &Fit) -> bool {
     (0..fit.placed.len()).all(|k| is_plausible(context, declared, fit, k))
@@ -231,22 +249,30 @@ impl Fit {
 
     /// The same for a report. Where the likelihood of a shape is not a parabola (an instant between two visits, an onset between
     /// two levels), its error is at least half the width over which it falls by 1.92, over 1.96. The error of an amplitude
-    /// holds what the errors of the shapes make of it, and every parameter an allowance for its form.
+    /// holds what the errors of the shapes make of it, and every parameter an allowance for its form. One that has its sign whatever the
+    /// shapes are does not lose it in its interval.
     #[must_use]
     pub fn profiled_estimates(&self, context: &Context, declared: Declared<'_>, position: usize) -> Vec<Estimate> {
         let errors = self.shape_errors(context, declared, position, true);
         let mut out = self.estimates_given(context, position, errors.clone());
         for (i, error) in errors.iter().enumerate() {
             for (e, moved) in out[errors.len()..].iter_mut().zip(self.amplitudes_moved(context, declared, position, i, *error)) {
-                e.se = e.se.hypot(moved);
+                e.se = moved.widen(e);
             }
         }
         allow_for_the_form(context, &mut out);
         out
     }
 
-    /// By how much the amplitudes of an effect move, in the order of [`Self::estimates`], when one of its shapes moves by its standard error.
-    fn amplitudes_moved(&self, context: &Context, declared: Declared<'_>, position: usize, shape: usize, error: f64) -> Vec<f64> {
+    /// Where the amplitudes of an effect move, in the order of [`Self::estimates`], when one of its shapes moves by its standard error.
+    fn amplitudes_moved(
+        &self,
+        context: &Context,
+        declared: Declared<'_>,
+        position: usize,
+        shape: usize,
+        error: f64,
+    ) -> Vec<Moved> {
         let placed = &self.placed[position];
         let Some(range) = placed.effect.shapes(context, &placed.instance).get(shape).map(|s| s.range) else { return Vec::new() };
         let amplitudes = |sign: f64| -> Option<Vec<f64>> {
@@ -258,7 +284,7 @@ impl Fit {
             Some(all[placed.shape.len()..].iter().map(|e| e.value).collect())
         };
         match (amplitudes(1.0), amplitudes(-1.0)) {
-            (Some(up), Some(down)) => up.iter().zip(&down).map(|(u, d)| 0.5 * (u - d).abs()).collect(),
+            (Some(up), Some(down)) => up.into_iter().zip(down).map(|(up, down)| Moved { up, down }).collect(),
             _ => Vec::new(),
         }
     }
@@ -424,4 +450,28 @@ fn half_width(fall: &dyn Fn(f64) -> f64, step: f64, bound: f64) -> f64 {
         if fall(mid) < FALL { inner = mid } else { outer = mid }
     }
     outer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known_to(se: f64) -> Estimate {
+        Estimate { name: "derate".into(), unit: "1/A2".into(), value: 6.0, se }
+    }
+
+    #[test]
+    fn an_amplitude_keeps_the_sign_that_it_has_for_every_shape() {
+        // twice as large with a shape that may be twice as long, and never nothing
+        let moved = Moved { up: 13.0, down: 3.0 };
+        let se = moved.widen(&known_to(0.5));
+        assert!(se > 2.9 && 6.0 - 1.96 * se > 0.0, "{se}");
+        let again = moved.widen(&known_to(se));
+        assert!(6.0 - 1.96 * again > 0.0, "{again}");
+        // one that a shape turns round has no sign, nor has one that is nothing anyway
+        assert!(6.0 - 1.96 * Moved { up: 13.0, down: -1.0 }.widen(&known_to(0.5)) < 0.0);
+        assert!(6.0 - 1.96 * moved.widen(&known_to(4.0)) < 0.0);
+        // a shape that matters little widens as errors do
+        assert!((Moved { up: 6.3, down: 5.7 }.widen(&known_to(0.4)) - 0.5).abs() < 1e-12);
+    }
 }
