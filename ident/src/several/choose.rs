@@ -36,6 +36,8 @@ pub(super) struct Named {
     pub(super) score: f64,
     /// The same of what could stand in its place, were it not there.
     pub(super) rivals: Vec<(&'static str, f64)>,
+    /// The best of these.
+    pub(super) rival: Option<Placed>,
 }
 
 /// The effects of the rig but one.
@@ -95,8 +97,10 @@ pub(super) fn choose(runs: &[&Closed], members: &[Member<'_>], progress: &mut dy
     exchange(&joint, &mut rig, &mut now, &mut pool);
     let named = |k: usize| {
         let (score, without) = gain_of(&joint, &rig, &now, k);
-        let rivals = rivals(&joint, &rig, k, &without, &pool).into_iter().map(|(p, gain)| (p.effect.id(), gain)).collect();
-        Named { placed: rig[k].clone(), score, rivals }
+        let others = rivals(&joint, &rig, k, &without, &pool);
+        let rival = others.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(p, _)| p.clone());
+        let rivals = others.into_iter().map(|(p, gain)| (p.effect.id(), gain)).collect();
+        Named { placed: rig[k].clone(), score, rivals, rival }
     };
     (0..rig.len()).map(named).collect()
 }

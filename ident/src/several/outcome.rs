@@ -16,15 +16,16 @@ use crate::close::Closed;
 use crate::close::supply_limit;
 use crate::effects::Estimate;
 use crate::effects::placed::Placed;
+use crate::experiment::between;
 use crate::log::Log;
 use crate::log::sparse;
 use crate::model::{AddedEffect, FittedTo, Model, Polynomial, Reach, RunLevel, shape_errors, stood};
 use crate::numeric::order::median;
 use crate::numeric::parallel::in_parallel;
 use crate::signal::{bad, start};
-use crate::verdict::Verdict;
 use crate::verdict::words::parameter_of;
 use crate::verdict::words::{DISAGREE, OTHERWISE, digits, scaled};
+use crate::verdict::{Kind, NextExperiment, Verdict};
 
 /// What several runs amount to.
 #[derive(Debug, Clone)]
@@ -145,7 +146,10 @@ pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> O
         without: &without,
         disagreements: &disagreements,
     };
-    let verdict = words::verdict(&told);
+    let mut verdict = words::verdict(&told);
+    if verdict.verdict == Kind::Ambiguous {
+        verdict.next_experiment = next(&told, &joint, &rig, &verdict);
+    }
     let shown = shown(&tenable);
     let quoted =
         |k: usize| verdict.effects.iter().find(|e| e.run.is_none() && rig[k].is_told_by(e)).and_then(|e| e.channels.first());
@@ -155,6 +159,21 @@ pub fn close_together(runs: &[Run], progress: &mut (dyn FnMut(f64) + Send)) -> O
     let left = verdict.unexplained.iter().map(|u| loudest(&u.channel)).collect();
     progress(1.0);
     Outcome { contexts, declared, model, verdict, alone, shown, each, left }
+}
+
+/// The run that would settle what these leave open: as the model has it, and as it would be with the likeliest rival in the place of the name that
+/// the verdict's first alternative replaces.
+fn next(told: &Told<'_, '_>, joint: &Joint<'_, '_>, rig: &[Placed], verdict: &Verdict) -> Option<NextExperiment> {
+    let disputed = verdict.alternatives.iter().find_map(|a| verdict.effects.get(a.change.as_ref()?.place))?;
+    let k = rig.iter().position(|p| p.is_told_by(disputed))?;
+    let mut other = rig.to_vec();
+    other[k] = told.tenable.named.get(k)?.rival.clone()?;
+    let shared = joint.shared(&other);
+    let own = joint.members.iter().map(|m| own::of(m, &other, &shared)).collect();
+    let ids = [&rig[k], &other[k]].map(|p| p.effect.id().to_owned());
+    let rival = model(told.runs, told.contexts, &shared, &other, &[], own);
+    let next = between(told.contexts.first()?, told.models[1], &rival, &ids)?;
+    Some(NextExperiment { why: next.why.replacen("this run", "these runs", 1), ..next })
 }
 
 /// The declared model, fitted to all runs: no effect, of the rig or of a run.
