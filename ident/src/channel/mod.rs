@@ -32,6 +32,7 @@ pub(crate) use crate::log::STANDSTILL;
 pub(crate) use facts::Remembered;
 pub(crate) use facts::{Coast, Draw, Facts, Question, Rail, SawTooth};
 pub use relation::{DIFFERENCES, Relation, is_contrast, unit_of};
+pub(crate) use target::NOISIER;
 pub use target::Target;
 
 /// Time after which a rotor of this size has arrived at its new speed, s: five time constants of 0.05 s.

@@ -55,7 +55,7 @@ const FLOORED: f64 = 0.05;
 
 /// Times what a channel scattered on the day of a declared model from which on it is noisier than days differ: 2.6 times is seen where gusts
 /// are taken for noise on one day and for the rotor's way on another.
-const NOISIER: f64 = 4.0;
+pub(crate) const NOISIER: f64 = 4.0;
 
 /// Samples beyond the degree of a polynomial that a fit needs: one for the constant, three to tell its noise.
 pub(super) const FEWEST_BEYOND: usize = 4;
