@@ -15,6 +15,7 @@ use crate::fit::Fit;
 use crate::fit::heldout;
 use crate::model::Declared;
 use crate::signal::colour::effective_share;
+use crate::signal::stretches::CALM_US;
 use crate::verdict::{Channels, Unexplained};
 use std::ops::Range;
 
@@ -159,7 +160,7 @@ pub(crate) fn looks_like(context: &Context, target: &Target, residual: &[f64]) -
         return BEHIND_STEPS.to_owned();
     }
     let pace = match look {
-        Look::OnTheWay => return "while the load is on its way".to_owned(),
+        Look::OnTheWay => return ON_THE_WAY.to_owned(),
         Look::InOne(stretch) => return in_one(context, target, &stretch),
         Look::InSingleRows => return "in single rows".to_owned(),
         Look::InBursts => return "in short bursts".to_owned(),
@@ -199,7 +200,9 @@ fn is_filled(stretch: &[f64]) -> bool {
     2 * (sums.take_while(|sum| *sum < enough).count() + 1) >= stretch.len()
 }
 
-/// What is said of a residual that lies there.
+/// What is said of a residual that lies where the load changes.
+pub(crate) const ON_THE_WAY: &str = "while the load is on its way";
+/// What is said of a residual that lies in the beginnings of holds.
 pub(crate) const BEHIND_STEPS: &str = "right behind steps of the command";
 /// Part of a hold of the command that is its beginning, and most of the rows that may lie in one: a command that never stops has no steps.
 const BEGINNING: (f64, f64) = (0.1, 0.25);
@@ -245,8 +248,22 @@ fn in_one(context: &Context, target: &Target, stretch: &Range<usize>) -> String 
     if context.time_is_row {
         format!("in one stretch, rows {from:.0} to {to:.0}")
     } else {
-        format!("in one stretch, {from:.1} to {to:.1} s")
+        let behind = if begins_with_a_step(context, target, stretch) { BEHIND_ONE } else { "" };
+        format!("in one stretch, {from:.1} to {to:.1} s{behind}")
     }
+}
+
+/// What is said of a stretch that begins with a step of the command.
+pub(crate) const BEHIND_ONE: &str = ", right behind a step";
+
+/// Whether the command jumps at the beginning of a stretch of samples: no further before it than a sample, and no later than after a tenth of it.
+fn begins_with_a_step(context: &Context, target: &Target, stretch: &Range<usize>) -> bool {
+    let Some(pulse) = &context.pulse else { return false };
+    let row = |k: usize| target.rows.get(k).copied();
+    let (Some(from), Some(to)) = (row(stretch.start.saturating_sub(1)), row(stretch.start + stretch.len() / 10)) else {
+        return false;
+    };
+    (from.max(1)..=to).any(|i| matches!((pulse.get(i - 1), pulse.get(i)), (Some(a), Some(b)) if (b - a).abs() > CALM_US))
 }
 
 /// The most that rows one after the other hold, a few times as many as count as few, and those of them that hold nine tenths of it: spikes over a

@@ -74,12 +74,12 @@ pub(crate) fn between(context: &Context, model: &Model, other: &Model, [own, riv
         let schedule = families.pop()?.1;
         let names = weather.join(" and ");
         let how = if weather.iter().any(|w| w == "temp_c") {
-            ": let the rig cool down in a pause that is much longer than the run, or run it at another ambient temperature"
+            ": after a pause in which the rig cools down, much longer than the run, or at another ambient temperature"
         } else {
-            ": run on another day"
+            ": on another day"
         };
         let why = format!(
-            "{both}, and no course of the load tells them apart: they differ by what {names} does, which in this run followed time; repeat the run while {names} takes another course{how}"
+            "{both}, and the load alone cannot tell them apart: they differ by what {names} does, which in this run followed time; fly the schedule below while {names} takes another course{how}"
         );
         return Some(NextExperiment { why, separates: true, schedule });
     }
@@ -262,7 +262,7 @@ mod tests {
         let closed = close(&staircase(0.0), None, &[], &mut |_| {}).expect("a log");
         for declared in [Declared::default(), Declared { model: Some(&closed.declared) }] {
             let next = asked(&closed, declared);
-            assert!(next.why.contains("no course of the load tells them apart"), "{}", next.why);
+            assert!(next.why.contains("the load alone cannot tell them apart"), "{}", next.why);
             assert!(next.why.contains("another ambient temperature"), "{}", next.why);
             assert!(!next.schedule.is_empty());
         }

@@ -55,7 +55,7 @@ pub fn several(runs: &[Run], outcome: &Outcome, links: &[String]) -> String {
                 sheet.html_part(&format!("<p><a href=\"{}\">The run alone</a>, with its own verdict.</p>\n", escape(link)));
             }
             sheet.say("What follows is not of the run alone. It is this run as a fit to the other runs predicts it:");
-            sheet.html_part(&parts::bars(&channels(v, outcome, run, of), &[], &[], pair(v)));
+            sheet.html_part(&parts::bars(&channels(v, outcome, run, of), pair(v)));
         });
     }
     sheet.html()

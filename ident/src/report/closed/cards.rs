@@ -258,6 +258,8 @@ fn contest(e: &EffectEntry, sure: &str, against: &[Rival], none: f64) -> String 
         None if none >= OPEN => format!("{sure}: p {p}, other names or none {}", equals(&probability(none))),
         None if e.of_no_run().is_some() => format!("{sure}: p {p}, no rival; its size differs from run to run"),
         None if little => format!("{sure}: p {p}, no rival; it takes next to nothing"),
+        // the word is of what may be left of it, the figure of its being there
+        None if e.told_probability() < e.probability => format!("{sure}: p {p}, no rival, yet every size may be zero"),
         None => format!("{sure}: p {p}, no rival"),
     }
 }
@@ -451,6 +453,14 @@ fn settle(page: &Page<'_>, e: &EffectEntry) -> Option<String> {
             "a run of another kind. The {} runs at hand leave it open, and one more like them hardly tells: change what the rivals differ in, the supply, the order of the levels or how long each is held.",
             v.runs.len()
         ));
+    }
+    // a rival that is of the rig as well is there again, too
+    let place = v.effects.iter().position(|other| std::ptr::eq(other, e)).unwrap_or(usize::MAX);
+    if rivals(v, page.words, place).first().is_some_and(|r| r.probability >= COUNTED && !r.ids.is_empty()) {
+        return Some(
+            "a run of another kind: change what the two differ in, the supply, the order of the levels or how long each is held."
+                .to_owned(),
+        );
     }
     if !v.validation.is_empty() && e.scope == crate::verdict::Scope::Rig {
         return Some(format!(

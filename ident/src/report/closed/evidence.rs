@@ -5,7 +5,7 @@
 //! Units: the channel's.
 //! Reference: component-plus-residual plots: Larsen & McCleary 1972, Technometrics 14:781.
 
-use super::sentence::{begins_with, whole};
+use super::sentence::{begins_with, unnamed_rest, whole};
 use super::vocabulary::Vocabulary;
 use crate::numeric::order::median;
 use crate::report::figure::{Figure, Layer, Mark};
@@ -169,6 +169,11 @@ pub(crate) fn headed(verdict: &Verdict, words: Vocabulary) -> impl Fn(&str) -> b
 
 /// The channel that the sentence begins with, over time and enlarged; without names the loudest.
 pub(crate) fn most(verdict: &Verdict, words: Vocabulary, traces: &[Trace]) -> Vec<Figure> {
+    if let Some(rest) = unnamed_rest(verdict, words)
+        && let Some(trace) = traces.iter().find(|t| t.channel == rest.channel)
+    {
+        return shown_most(trace, pair(verdict));
+    }
     // of several sensors or axes of one quantity the one that shows most
     let headed = headed(verdict, words);
     let weight = |t: &&Trace| {

@@ -6,7 +6,7 @@
 //! Reference: specification `report.md`.
 
 use super::provenance::{Origin, provenance};
-use super::sentence::PER_CENT;
+use super::sentence::{PER_CENT, unnamed_rest};
 use super::vocabulary::Vocabulary;
 use super::{cards, cautions, fold, left, sentence, state};
 use crate::channel::unit_of;
@@ -86,6 +86,7 @@ pub(crate) fn begin(page: &Page<'_>) -> Sheet {
     if !page.hero.is_empty() {
         let of_every = format!("What every {} has, where it shows most", page.words.noun);
         sheet.section(match v.verdict {
+            _ if unnamed_rest(v, page.words).is_some() => "The channel on which most is left",
             // that a rotor takes time convinces nobody of anything
             Kind::Attributed if v.effects.iter().all(|e| e.id == "unknown" || e.kin != Kin::Own) => &of_every,
             Kind::Attributed | Kind::Ambiguous => "The figure that convinces most",

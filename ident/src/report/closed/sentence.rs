@@ -11,7 +11,7 @@ use super::left::{fitted, fitted_over};
 use super::lost;
 use super::vocabulary::Vocabulary;
 use crate::attribution::rivals::beyond;
-use crate::attribution::unexplained::LOUD;
+use crate::attribution::unexplained::{BEHIND_ONE, BEHIND_STEPS, LOUD, ON_THE_WAY};
 use crate::verdict::words::{Clause, adverb, channel, counted, heading, list, over_time, rms, upper, upper_bound, vector};
 use crate::verdict::{Alternative, Channel, EffectEntry, Kin, Kind, Parameter, Unexplained, Verdict};
 
@@ -124,18 +124,19 @@ fn attributed(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
     let told = if told.is_empty() { vec![*first] } else { told };
     let more = causes(all).saturating_sub(told.len());
     let clauses = by_subject(verdict, &told, words);
-    let out = match own.is_empty() {
-        true => format!(
-            "{} What every {noun} has: {}.",
-            since(news, &format!("nothing of this {noun}'s own was named.")),
-            joined_lower(&clauses)
-        ),
-        false => headlong(&clauses, news),
+    let nothing = since(news, &format!("nothing of this {noun}'s own was named."));
+    let every = format!("What every {noun} has: {}.", joined_lower(&clauses));
+    let rest = unnamed_rest(verdict, words).map(|_| left(verdict));
+    let out = match (own.is_empty(), &rest) {
+        (true, Some(rest)) => format!("{nothing} {rest} {every}"),
+        (true, None) => format!("{nothing} {every}"),
+        (false, _) => headlong(&clauses, news),
     };
     let explained = explained(verdict, &told, false, news);
     // what says that more is told below has said so
     let more = if explained.as_ref().is_some_and(|e| e.says_more) { 0 } else { more };
-    [out, explained.map(|e| e.said).unwrap_or_default(), below(more, true, false), left(verdict)]
+    let last = if rest.is_some() { String::new() } else { left(verdict) };
+    [out, explained.map(|e| e.said).unwrap_or_default(), below(more, true, false), last]
         .into_iter()
         .filter(|s| !s.is_empty())
         .collect::<Vec<_>>()
@@ -251,7 +252,24 @@ fn ambiguous(verdict: &Verdict, words: Vocabulary, news: bool) -> String {
         Some(other) => without(&best, &other.ids),
         None => best,
     };
-    contested(verdict, words, news, &disputed)
+    // where in its row a reading lies is no news, and no question that a reader has
+    if disputed.iter().any(|e| e.kin != Kin::WithinRow) {
+        return contested(verdict, words, news, &disputed);
+    }
+    // what is named stands, and the question is what there is beside it
+    let said = attributed(verdict, words, news);
+    match as_well(verdict, words).filter(|_| disputed.is_empty()) {
+        Some(more) => format!("{said} Perhaps {more}: {}.", doubt(verdict)),
+        None => said,
+    }
+}
+
+/// What the likeliest alternative has beside all that is named, as a clause.
+fn as_well(verdict: &Verdict, words: Vocabulary) -> Option<String> {
+    let best: Vec<&EffectEntry> = verdict.effects.iter().filter(|e| e.id != "unknown").collect();
+    let more = instead(&best, &verdict.alternatives.first()?.ids);
+    let clauses: Vec<String> = more.iter().map(|id| words.of_another(id, None).with("")).collect();
+    (!clauses.is_empty()).then(|| format!("{} as well", list(&clauses)))
 }
 
 /// The sentence where a question is open: what could stand in the place of some effects, the likeliest first, and the largest sure cause.
@@ -502,7 +520,8 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry], open: bool, news: bool) -
     let names: Vec<String> = shares.iter().map(|s| whole(verdict, s.0)).collect();
     let but: String = worse(verdict, &is_told).collect();
     let of_each: Vec<String> = shares.iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))).collect();
-    let brief = format!("Explained: {}.{but}", list(&of_each));
+    let by_whom = if others { "Explained by all that is named" } else { "Explained" };
+    let brief = format!("{by_whom}: {}.{but}", list(&of_each));
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
         let said = format!("{subject} {} of what {} had left {}.{but}", per_cent(mean), list(&names), over(&per_cent(mean)));
@@ -537,13 +556,27 @@ pub(super) fn goes_beyond_noise(verdict: &Verdict) -> bool {
 }
 
 /// The quantity that a channel measures: several sensors of one speed are one.
-fn quantity(name: &str) -> &str {
+pub(super) fn quantity(name: &str) -> &str {
     if name.starts_with("rpm") && !name.starts_with("rpm_esc") { "rpm" } else { name }
 }
 
-/// What is loudest among what is left.
+/// What is loudest among what is left: where the load is held, if something is left there. When in its row a reading of a step lies is not known, and
+/// every rig has a rest there.
 pub(crate) fn loudest(verdict: &Verdict) -> Option<&Unexplained> {
-    loud(verdict).max_by(|a, b| floors_left(verdict, a).total_cmp(&floors_left(verdict, b)))
+    let most = |a: &&Unexplained, b: &&Unexplained| floors_left(verdict, a).total_cmp(&floors_left(verdict, b));
+    loud(verdict).filter(|u| !is_of_steps(u)).max_by(most).or_else(|| loud(verdict).max_by(most))
+}
+
+/// Whether what is left lies where the load changes.
+pub(super) fn is_of_steps(u: &Unexplained) -> bool {
+    [BEHIND_STEPS, BEHIND_ONE, ON_THE_WAY].iter().any(|said| u.looks_like.contains(said))
+}
+
+/// What is loudest where the load is held, on a run of which no cause of its own is named: nothing that is named is what its reader looks for.
+pub(crate) fn unnamed_rest(verdict: &Verdict, words: Vocabulary) -> Option<&Unexplained> {
+    let has_names = matches!(verdict.verdict, Kind::Attributed | Kind::Ambiguous) && !verdict.effects.is_empty();
+    let none_is_own = has_names && named(verdict, words).0.is_empty();
+    loudest(verdict).filter(|u| none_is_own && !is_of_steps(u))
 }
 
 /// The error that is left on a channel, with unit: the one that the state of the channels tells.
@@ -617,8 +650,12 @@ fn left(verdict: &Verdict) -> String {
     // what is left on the other channels stands beside their bars
     let unknown = if share(verdict, &told.channel).is_none_or(|s| s < HALF) { " No known effect explains it." } else { "" };
     let beyond = beyond_the_fit(verdict, told);
+    let louder = |u: &Unexplained| floors_left(verdict, u) > floors_left(verdict, told);
     match loud(verdict).any(|u| quantity(&u.channel) != what) {
         false => format!("On {on} {size} is left ({}).{beyond}{unknown}", looks(told)),
+        true if !is_of_steps(told) && loud(verdict).any(|u| quantity(&u.channel) != what && louder(u)) => {
+            format!("Where the load is held, most is left on {on}: {size} ({}).{beyond}{unknown}", looks(told))
+        }
         true => format!("Most is left on {on}: {size} ({}).{beyond}{unknown}", looks(told)),
     }
 }

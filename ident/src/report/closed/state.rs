@@ -7,6 +7,7 @@
 
 use super::evidence::pair;
 use super::lost;
+use super::sentence::is_of_steps;
 use crate::attribution::unexplained::LOUD;
 use crate::report::svg::escape;
 use crate::verdict::words::{channel, digits, scaled, upper};
@@ -48,12 +49,36 @@ pub(super) fn figures(unit: &str, floor: f64, before: f64, after: f64) -> [Strin
     [floor, before, after].map(|v| format!("{} {unit}", digits(factor * v, 0.005 * (factor * v).abs())))
 }
 
-/// What is said of a channel in a word. `left`: what remains is no noise; `named`: a name improves it; `known`: nothing has changed since the
+/// Whether what remains on a channel is more than noise, and where.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Rest {
+    /// It is noise.
+    None,
+    /// It lies where the load changes, where every rig has some: when in its row a reading lies is not known.
+    AtSteps,
+    /// It lies where the load is held as well.
+    Anywhere,
+}
+
+impl Rest {
+    /// What a verdict has on a channel.
+    pub(super) fn on(v: &Verdict, name: &str) -> Self {
+        match v.unexplained.iter().find(|u| u.channel == name) {
+            Some(u) if is_of_steps(u) => Self::AtSteps,
+            Some(_) => Self::Anywhere,
+            None => Self::None,
+        }
+    }
+}
+
+/// What is said of a channel in a word. `rest`: where what remains lies; `named`: a name improves it; `known`: nothing has changed since the
 /// declared model was made, so that what remains was there before.
-pub(super) fn word([before, after]: [f64; 2], left: bool, named: bool, known: bool) -> &'static str {
+pub(super) fn word([before, after]: [f64; 2], rest: Rest, named: bool, known: bool) -> &'static str {
+    let left = rest != Rest::None;
     match after {
         f if !f.is_finite() => "not known",
         f if known && (left || f > EXPLAINED) => "as before",
+        f if f > LOUD && rest == Rest::AtSteps => "left at steps",
         f if f > LOUD => "unexplained rest",
         f if f > EXPLAINED => "little left",
         _ if left => "a trace left",
@@ -81,7 +106,7 @@ fn spoken(name: &str) -> String {
 
 /// The bars of a verdict's channels.
 pub(super) fn state(v: &Verdict, declared: &str, per_cent: bool, known: bool) -> String {
-    let left: Vec<&str> = v.unexplained.iter().map(|u| u.channel.as_str()).collect();
+    let left: Vec<(&str, Rest)> = v.unexplained.iter().map(|u| (u.channel.as_str(), Rest::on(v, &u.channel))).collect();
     let beside = v.unexplained.iter().filter_map(|u| {
         let one = u.channel.strip_suffix(" - others")?;
         Some(format!("{} against the other sensors: {:.1} noise floors left", upper(&channel(one)), u.over_floor))
@@ -100,15 +125,15 @@ pub(super) fn state(v: &Verdict, declared: &str, per_cent: bool, known: bool) ->
     drawn(&lost::drawn(v), &told, pair(v)) + &beside + &stays + &key
 }
 
-/// The bars; `left` are the channels on which more than noise is left, `named` those that a name improves.
-pub(crate) fn bars(channels: &Channels, left: &[&str], named: &[&str], names: [&str; 2]) -> String {
-    drawn(channels, &Told { left, named, stays: &[], known: false }, names)
+/// The bars of channels of which nothing but the errors is known.
+pub(crate) fn bars(channels: &Channels, names: [&str; 2]) -> String {
+    drawn(channels, &Told { left: &[], named: &[], stays: &[], known: false }, names)
 }
 
 /// What is known of the channels beside their errors.
 struct Told<'t> {
-    /// Those on which more than noise is left.
-    left: &'t [&'t str],
+    /// Those on which more than noise is left, and where.
+    left: &'t [(&'t str, Rest)],
     /// Those that a name improves.
     named: &'t [&'t str],
     /// Those whose scatter is a fault that has a name.
@@ -123,8 +148,8 @@ impl Told<'_> {
         if self.stays.contains(&name) {
             return STAYS;
         }
-        let [left, named] = [self.left, self.named].map(|list| list.contains(&name));
-        word(floors, left, named, self.known)
+        let rest = self.left.iter().find(|(left, _)| *left == name).map_or(Rest::None, |(_, rest)| *rest);
+        word(floors, rest, self.named.contains(&name), self.known)
     }
 }
 
@@ -216,22 +241,25 @@ mod tests {
 
     #[test]
     fn no_state_contradicts_what_stands_beside_it() {
-        for (floors, left, named, said) in [
-            ([1.2, 0.9], false, false, "only noise"),
-            ([1.2, 0.9], false, true, "explained"),
-            ([40.0, 1.2], false, false, "explained"),
-            ([1.2, 0.8], true, false, "a trace left"),
-            ([40.0, 2.0], false, true, "little left"),
-            ([40.0, 3.5], false, true, "unexplained rest"),
-            ([40.0, f64::NAN], false, true, "not known"),
+        for (floors, rest, named, said) in [
+            ([1.2, 0.9], Rest::None, false, "only noise"),
+            ([1.2, 0.9], Rest::None, true, "explained"),
+            ([40.0, 1.2], Rest::None, false, "explained"),
+            ([1.2, 0.8], Rest::Anywhere, false, "a trace left"),
+            ([40.0, 2.0], Rest::AtSteps, true, "little left"),
+            ([40.0, 3.5], Rest::Anywhere, true, "unexplained rest"),
+            ([40.0, 3.5], Rest::AtSteps, true, "left at steps"),
+            ([40.0, f64::NAN], Rest::None, false, "not known"),
         ] {
-            assert_eq!(word(floors, left, named, false), said, "{floors:?} {left} {named}");
+            assert_eq!(word(floors, rest, named, false), said, "{floors:?} {rest:?} {named}");
         }
         // nothing is unexplained of what the model is known to be off by
-        for (floors, left, said) in
-            [([3.5, 3.5], true, "as before"), ([2.0, 2.0], false, "as before"), ([1.2, 0.9], false, "only noise")]
-        {
-            assert_eq!(word(floors, left, false, true), said, "{floors:?} {left}");
+        for (floors, rest, said) in [
+            ([3.5, 3.5], Rest::Anywhere, "as before"),
+            ([2.0, 2.0], Rest::None, "as before"),
+            ([1.2, 0.9], Rest::None, "only noise"),
+        ] {
+            assert_eq!(word(floors, rest, false, true), said, "{floors:?} {rest:?}");
         }
     }
 
@@ -244,7 +272,7 @@ mod tests {
             channels.predicted.insert(name.into(), c);
         }
         channels.not_predicted.insert("rpm".into(), "no command was logged".into());
-        let html = bars(&channels, &[], &[], ["declared, nothing added", ""]);
+        let html = bars(&channels, ["declared, nothing added", ""]);
         assert!(!html.contains("corrected"), "{html}");
         assert!(!html.contains("half a floor"), "none of these is");
         let scale = Scale::of(&channels);

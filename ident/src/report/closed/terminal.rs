@@ -11,7 +11,7 @@ use super::contest::rivals;
 use super::left::{in_words, looks_and_goes, shared, size_told};
 use super::lost;
 use super::sentence::{PER_CENT, floors_left, instead, order, sentence, without};
-use super::state::{STAYS, factor, figures, is_as_before, named, word};
+use super::state::{Rest, STAYS, factor, figures, is_as_before, named, word};
 use super::vocabulary::Vocabulary;
 use crate::channel::unit_of;
 use crate::signal::bad::SetAside;
@@ -117,10 +117,10 @@ fn channels(verdict: &Verdict, known: bool) -> String {
     let row = |(name, c): (&String, &Channel)| {
         let [floor, before, after] = figures(&c.unit, c.noise_floor_rms, c.before.heldout_rms, c.after.heldout_rms);
         let floors = [c.before, c.after].map(|f| f.heldout_rms / c.noise_floor_rms);
-        let left = verdict.unexplained.iter().any(|u| u.channel == *name);
+        let rest = Rest::on(verdict, name);
         let named = named.contains(&name.as_str());
         let times = factor(c.before.heldout_rms, c.after.heldout_rms);
-        let state = if stays.iter().any(|s| s.0 == name) { STAYS } else { word(floors, left, named, known) };
+        let state = if stays.iter().any(|s| s.0 == name) { STAYS } else { word(floors, rest, named, known) };
         [channel(name), floor, before, after, times, state.to_owned()]
     };
     let shown = lost::drawn(verdict);
