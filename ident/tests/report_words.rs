@@ -944,3 +944,34 @@ fn against_a_model_a_share_is_told_of_every_quantity_that_was_plain() {
     let said = sentence(&of, Vocabulary::RIG, true);
     assert!(said.contains("of what thrust had left over"), "{said}");
 }
+
+/// Behind steps every rig has a rest, be it the loudest: what is left where the load is held is what nobody expects.
+#[test]
+fn what_is_left_where_the_load_is_held_comes_first() {
+    let mut v =
+        verdict(Kind::Attributed, vec![effect("spinup_lag", "voltage_v", 1.0, 0.5, vec![parameter("tau_up", 0.05, 0.01, "s")])]);
+    let looks = |channel: &str, over_floor: f64, looks_like: &str| Unexplained {
+        looks_like: looks_like.into(),
+        ..left(channel, over_floor)
+    };
+    v.unexplained = vec![looks("voltage_v", 8.0, "right behind steps of the command"), looks("thrust_n", 3.04, "slow")];
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.starts_with("Nothing of this rig's own was named. Where the load is held, most is left on thrust: "), "{said}");
+    let text = terminal(&v, Vocabulary::RIG, false);
+    assert!(text.contains("left at steps") && text.contains("unexplained rest"), "{text}");
+    // with nothing else the steps are told
+    v.unexplained.truncate(1);
+    v.channels.predicted.remove("thrust_n");
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.contains("On voltage 80.0 mV rms is left (right behind steps of the command)"), "{said}");
+}
+
+/// An alternative that has all the names and one more puts none of them in doubt.
+#[test]
+fn what_may_be_there_as_well_is_told_as_that() {
+    let mut v = verdict(Kind::Ambiguous, vec![sag(0.99)]);
+    v.alternatives = vec![alternative(&["supply_sag", "channel_delay"], 0.05)];
+    let said = sentence(&v, Vocabulary::RIG, false);
+    assert!(said.starts_with("The supply lead drops 41 mV per ampere."), "{said}");
+    assert!(said.contains(" as well: this run cannot tell") && !said.contains("not sure"), "{said}");
+}

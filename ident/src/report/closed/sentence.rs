@@ -520,8 +520,7 @@ fn explained(verdict: &Verdict, told: &[&EffectEntry], open: bool, news: bool) -
     let names: Vec<String> = shares.iter().map(|s| whole(verdict, s.0)).collect();
     let but: String = worse(verdict, &is_told).collect();
     let of_each: Vec<String> = shares.iter().map(|s| format!("{} for {}", per_cent(s.1), whole(verdict, s.0))).collect();
-    let by_whom = if others { "Explained by all that is named" } else { "Explained" };
-    let brief = format!("{by_whom}: {}.{but}", list(&of_each));
+    let brief = format!("Explained: {}.{but}", list(&of_each));
     if most - least <= ALIKE {
         let mean = shares.iter().map(|s| s.1).sum::<f64>() / shares.len() as f64;
         let said = format!("{subject} {} of what {} had left {}.{but}", per_cent(mean), list(&names), over(&per_cent(mean)));
