@@ -135,3 +135,30 @@ fn the_first_stands_alone_and_takes_no_strange_second() {
     let said = Model::parse("m.toml", &twice).expect_err("twice").to_string();
     assert!(said.contains("discrepancy_sha256") && said.contains("the same stands in this file"), "{said}");
 }
+
+/// Wherever a copy of a model ends early it is refused, at its last line; by hand a number may be changed, and an effect taken out.
+#[test]
+fn a_model_that_ends_early_is_refused() {
+    let folder = TempDir::new().expect("a folder");
+    let path = written(&folder, &model(0.2));
+    let whole = fs::read_to_string(&path).expect("its own");
+    for at in 1..whole.len() - 1 {
+        fs::write(&path, &whole[..at]).expect("a file");
+        let said = Model::read(&path).expect_err(&whole[..at]).to_string();
+        let head = whole.find('\n').expect("a line");
+        assert!(at < head || said.contains("the file ends early, after '"), "{at}: {said}");
+        assert!(at < head || said.contains(&format!("model.toml:{}:", whole[..at].lines().count())), "{at}: {said}");
+    }
+    // what a hand wrote, or an older version: no promise, no end
+    let bare: String = whole.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect();
+    for text in [bare, whole.replace("c0_v = 11.5", "c0_v = 11.0"), whole.replace('\n', "\r\n")] {
+        fs::write(&path, text).expect("a file");
+        Model::read(&path).expect("a model");
+    }
+    // the file beside it
+    fs::write(&path, &whole).expect("a file");
+    let second = fs::read_to_string(beside(&path)).expect("its own");
+    fs::write(beside(&path), &second[..second.len() / 2]).expect("a file");
+    let said = Model::read(&path).expect_err("half of it").to_string();
+    assert!(said.contains("does not belong to this model") && said.contains("the whole file that was written with it"), "{said}");
+}

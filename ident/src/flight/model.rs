@@ -9,6 +9,7 @@
 use super::FlightError;
 use super::columns::Usual;
 use super::vehicle::Vehicle;
+use crate::model::ending;
 use crate::numeric::digits;
 use crate::verdict::Parameter;
 use crate::verdict::Scope;
@@ -94,7 +95,7 @@ impl FlightModel {
             out += line;
             out.push('\n');
         }
-        out
+        ending::framed(&out)
     }
 
     /// Each number to the digits that its standard error supports.
@@ -119,6 +120,9 @@ impl FlightModel {
     /// [`FlightError::Model`] with the place.
     pub fn parse(file: &str, text: &str) -> Result<Self, FlightError> {
         let refuse = |line: usize, reason: String| FlightError::Model { file: format!("{file}:{line}"), reason };
+        if let Some((line, column, reason)) = ending::cut_short(text) {
+            return Err(FlightError::Model { file: format!("{file}:{line}:{column}"), reason });
+        }
         let model: Self = toml::from_str(text).map_err(|e| {
             let line = e.span().map_or(1, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
             refuse(line, e.message().lines().next().unwrap_or("not TOML").to_owned())

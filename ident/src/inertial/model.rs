@@ -9,6 +9,7 @@
 use super::least::Term;
 use super::search::{Cause, Scene, predict};
 use super::{Filter, InertialError, Recording, field, force, rate, unknown};
+use crate::model::ending;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -89,7 +90,7 @@ impl InertialModel {
     /// Never: the model is a table of numbers and words.
     #[must_use]
     pub fn to_toml(&self) -> String {
-        toml::to_string(self).expect("a table of numbers and words")
+        ending::framed(&toml::to_string(self).expect("a table of numbers and words"))
     }
 
     /// Reads the file's text; `file` is the name for messages.
@@ -98,6 +99,9 @@ impl InertialModel {
     /// [`InertialError::Model`] with the place.
     pub fn parse(file: &str, text: &str) -> Result<Self, InertialError> {
         let refuse = |line: usize, reason: String| InertialError::Model { file: format!("{file}:{line}"), reason };
+        if let Some((line, column, reason)) = ending::cut_short(text) {
+            return Err(InertialError::Model { file: format!("{file}:{line}:{column}"), reason });
+        }
         let model: Self = toml::from_str(text).map_err(|e| {
             let line = e.span().map_or(1, |s| text[..s.start.min(text.len())].matches('\n').count() + 1);
             refuse(line, e.message().lines().next().unwrap_or("not TOML").to_owned())

@@ -25,6 +25,7 @@ use crate::verdict::TOLD_BY_THE_BOARD;
 use toml::{Table, Value};
 
 mod discrepancy;
+pub(crate) mod ending;
 mod place;
 mod reach;
 mod read;
@@ -150,7 +151,7 @@ pub enum ModelError {
     },
     /// The file beside it belongs to another model.
     #[error(
-        "{model}: key discrepancy_sha256: {file} does not belong to this model (its SHA-256 is {found}); expected the file that was written with it: copy both together, or take that one away"
+        "{model}: key discrepancy_sha256: {file} does not belong to this model (its SHA-256 is {found}); expected the whole file that was written with it: copy both together, or take that one away"
     )]
     Pair {
         /// The model's file with line and column.
@@ -390,10 +391,10 @@ impl Model {
         if !list.is_empty() {
             root.insert("effect".into(), list.into());
         }
-        format!(
+        ending::framed(&format!(
             "# Powerplant model. Regressors: krpm = rpm / 1000, kus = (pulse_us - 1000) / 1000; *_se are standard errors.\n# An effect of scope rig acts on every run. One of scope run or event acts on the runs listed here; on_another_run is what is added to the\n# channel's polynomial elsewhere, and what an event left behind acts there from the start.\n# `seen` is how little and how much an effect adds to a channel on its own run: beyond that, another run gets it as far as its errors allow.\n{root}{}",
             self.course.as_ref().filter(|_| whole).map(Course::to_toml).unwrap_or_default()
-        )
+        ))
     }
 }
 

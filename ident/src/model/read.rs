@@ -7,8 +7,8 @@
 //! Reference: specification `formats.md`, "Powerplant model".
 
 use super::{
-    AddedEffect, FORMAT, Model, ModelError, Polynomial, STOOD, coefficient_key, discrepancy, keyed, leftover_keys, place, reach,
-    run, supply,
+    AddedEffect, FORMAT, Model, ModelError, Polynomial, STOOD, coefficient_key, discrepancy, ending, keyed, leftover_keys, place,
+    reach, run, supply,
 };
 use crate::channel::{Context, Relation};
 use crate::effects::placed::Placed;
@@ -83,6 +83,10 @@ impl Model {
     /// # Errors
     /// As [`Model::read`].
     pub fn parse(file: &str, text: &str) -> Result<Self, ModelError> {
+        if let Some((line, column, words)) = ending::cut_short(text) {
+            let message = format!("{words}; expected a model as `quadrig identify` or `close-loop` wrote it");
+            return Err(ModelError::Syntax { file: format!("{file}:{line}:{column}"), message });
+        }
         Self::from_table(&table_of(file, text)?).map_err(|refusal| place_of(file, text, refusal))
     }
 

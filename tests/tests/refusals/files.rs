@@ -171,6 +171,13 @@ pub(super) fn models() -> Vec<Case> {
         with("a model of another format", "bad.toml", "format = \"mine 1\"\n", PREDICT, &["bad.toml"]),
         with("a model cut short", "bad.toml", "format = \"quadrig-model 1\"\n[channel.rpm", PREDICT, &["bad.toml:2"]),
         with(
+            "a model that ends early",
+            "bad.toml",
+            "# Without a line `# end of the model` below, this file was cut short.\nformat = \"quadrig-model 1\"\nstart_pulse_us = 1000.0\n[channel.voltage_v]\nc0_v = 11.",
+            PREDICT,
+            &["bad.toml:5:11: the file ends early, after 'c0_v = 11.'", "copy it again whole"],
+        ),
+        with(
             "a model of bytes",
             "bad.toml",
             [0xFF_u8, 0xFE, 0x00, 0x81],
