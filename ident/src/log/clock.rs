@@ -28,18 +28,24 @@ const MICROSECONDS: f64 = 2000.0;
 /// Step between whole numbers, s, and length of a run with such steps, s, above which they are no seconds.
 const NO_SECONDS: [f64; 2] = [5.0, 10_800.0];
 
-/// Why time steps back at `place`: the rest of the file says whether it is one row, another run, or every other row.
+/// Rows in a row whose clock may have leapt, and how much longer than a usual step the way there is.
+const LEAP: (usize, f64) = (3, 3.0);
+
+/// Why time steps back at `place`: the rest of the file says whether it is one row, another run, or every other row. Each row before has its line.
 pub(super) fn stepped_back<R: BufRead>(
     value: f64,
     log: &Log,
+    lines: &[usize],
     place: &Place<'_>,
     rest: &mut Lines<'_, R>,
 ) -> Result<ReadError, ReadError> {
     let (mut last, mut rows, mut back) = (value, log.len() + 1, 1);
+    let mut next = None;
     let mut line = String::new();
     while rest.read_into(&mut line)? {
         let Some(t) = first_field(&line) else { continue };
         rows += 1;
+        next = next.or(Some(t));
         back += usize::from(t < last);
         last = t;
     }
@@ -47,6 +53,11 @@ pub(super) fn stepped_back<R: BufRead>(
     let start = log.t.first().copied().unwrap_or(value);
     let reason = if back >= 3 && back as f64 >= SHUFFLED * rows as f64 {
         format!("strictly increasing time; {back} of {rows} rows step back: the rows look shuffled, sort them by t_s")
+    } else if let Some((ahead, before)) = leapt_ahead(value, next, &log.t) {
+        let (line, odd) = (lines.get(ahead).copied().unwrap_or(place.line), log.t.get(ahead).copied().unwrap_or(value));
+        let found = format!("{odd} leaps ahead, after {before}; line {} goes on at {value}", place.line);
+        let reason = "strictly increasing time; a glitch of the clock: take the row out, or mend its time";
+        return Ok(Place { file: place.file, line }.refuse(Some("t_s"), found, reason));
     } else if back == 1 && log.len() >= ENOUGH && value - start < 0.1 * (before - start) {
         "strictly increasing time; a second run, or a clock that began anew: give each run a file of its own".to_owned()
     } else {
@@ -54,6 +65,19 @@ pub(super) fn stepped_back<R: BufRead>(
         format!("strictly increasing time; {rows} back (`quadrig import` repairs it by a stated rule)")
     };
     Ok(place.refuse(Some("t_s"), format!("{value} steps back from {before}"), reason))
+}
+
+/// The row before `value` from which on the clock had leapt ahead, and the time before that: `value` and the `next` row go on from there as if
+/// nothing had been.
+fn leapt_ahead(value: f64, next: Option<f64>, t: &[f64]) -> Option<(usize, f64)> {
+    let ahead = t.partition_point(|earlier| *earlier < value);
+    let (before, odd) = (*t.get(ahead.checked_sub(1)?)?, *t.get(ahead)?);
+    let mut steps: Vec<f64> = t.get(..ahead)?.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_unstable_by(f64::total_cmp);
+    let usual = LEAP.1 * steps.get(steps.len() / 2)?;
+    let rows = t.len() - ahead;
+    let goes_on = value - before <= usual * (rows + 1) as f64 && next.is_none_or(|next| value < next && next < odd);
+    (rows <= LEAP.0 && odd - before > usual && goes_on).then_some((ahead, before))
 }
 
 /// The time stamp of a row.
@@ -259,6 +283,16 @@ mod tests {
             "{}",
             text(&twice)
         );
+        // the clock leaps for a row or two: the row that leaps is told, not the one that is right again
+        for (leaps, times) in [(1, [999_999.0; 2]), (2, [999_999.0, 999_999.1])] {
+            let odd = |n: usize| if (25..25 + leaps).contains(&n) { times[n - 25] } else { n as f64 / 10.0 };
+            let said = text(&(0..60).map(odd).collect::<Vec<f64>>());
+            let found = format!("run.csv:28: column t_s: 999999 leaps ahead, after 2.4; line {} goes on at 2.", 28 + leaps);
+            assert!(said.contains(&found) && said.contains("expected") && said.contains("take the row out"), "{said}");
+        }
+        // the row that steps back is the odd one where time goes on behind it
+        let late: Vec<f64> = (0..60).map(|n| if n == 25 { 2.35 } else { f64::from(n) / 10.0 }).collect();
+        assert!(text(&late).contains("run.csv:28: column t_s: 2.35 steps back from 2.4"), "{}", text(&late));
         let once: Vec<f64> = (0..40).map(|n| if n == 20 { 1.95 } else { f64::from(n) / 10.0 }).chain([3.85]).collect();
         assert!(text(&once).contains("one row steps back (`quadrig import`"), "{}", text(&once));
     }

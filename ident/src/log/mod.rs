@@ -201,10 +201,10 @@ impl Log {
                 continue;
             }
             let place = lines.place();
-            // of a row that is cut short the time may be, too
-            let whole = header.len() <= fields_of(&line);
+            // of a row that is cut short the time may be, too, and of one field too many the first half of it
+            let whole = header.len() == fields_of(&line);
             if let Some(t) = clock::first_field(&line).filter(|t| whole && log.t.last().is_some_and(|last| t < last)) {
-                return Err(clock::stepped_back(t, &log, &place, &mut lines)?);
+                return Err(clock::stepped_back(t, &log, &row_lines, &place, &mut lines)?);
             }
             row_lines.push(place.line);
             read_row(&line, &header, &place, &mut log)?;

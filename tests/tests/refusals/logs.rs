@@ -217,6 +217,13 @@ pub(super) fn logs() -> Vec<Case> {
             IDENTIFY,
             &["bad.csv:84: column t_s: 7 steps back from 7.9", "one row steps back"],
         ),
+        with(
+            "a time that leaps ahead",
+            "bad.csv",
+            row(80, |row| row.replacen("8.0,", "999999,", 1)),
+            IDENTIFY,
+            &["bad.csv:84: column t_s: 999999 leaps ahead, after 7.9; line 85 goes on at 8.1", "take the row out"],
+        ),
         with("two rows", "bad.csv", rows(|rows| rows[..2].to_vec()), IDENTIFY, &["bad.csv", "more than 8 common samples"]),
         with(
             "channels without values",
