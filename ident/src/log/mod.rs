@@ -443,6 +443,10 @@ fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError>
             let expected = "commas (and points in the numbers); save it so, or use `quadrig import`";
             return Err(place.refuse(None, format!("{word} between the columns"), expected));
         }
+        if names.len() > 1 && names.iter().all(|name| name.is_empty() || name.parse::<f64>().is_ok()) {
+            let expected = "a header line above them that names the columns, such as t_s,pulse_us,rpm,thrust_n: put it back";
+            return Err(place.refuse(None, "no header: the first line that is no comment holds numbers", expected));
+        }
         return Err(place.refuse(names.first().map(String::as_str), "not the time column", "t_s (seconds) as the first column"));
     }
     for (i, name) in names.iter().enumerate() {
@@ -511,6 +515,33 @@ fn fields_of(line: &str) -> usize {
     1 + line.bytes().filter(|b| *b == b',').count()
 }
 
+/// The column of a row with one field too many whose number a decimal comma has cut in two, and both parts: of those that it could be the one
+/// whose row is most like the row before.
+fn cut_by_its_comma<'a>(line: &'a str, header: &'a [String], log: &Log) -> Option<(&'a str, &'a str, &'a str)> {
+    let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    // how far a row is from the one before, each column by its own size
+    let distance = |cut: usize| -> Option<f64> {
+        let (whole, part) = (fields.get(cut)?, fields.get(cut + 1)?);
+        if !digits(whole.strip_prefix('-').unwrap_or(whole)) || !digits(part) {
+            return None;
+        }
+        let joined = format!("{whole}.{part}");
+        let row = fields.iter().take(cut).copied().chain([joined.as_str()]).chain(fields.iter().skip(cut + 2).copied());
+        let before = std::iter::once(&log.t).chain(log.columns.iter().map(|c| &c.values)).map(|values| values.last().copied());
+        let mut sum = 0.0;
+        for (text, before) in row.zip(before) {
+            let value = if text.is_empty() { continue } else { text.parse::<f64>().ok()? };
+            let size = before.map_or(0.0, |before| value.abs().max(before.abs()));
+            sum += before.filter(|_| size > 0.0).map_or(0.0, |before| (value - before).abs() / size);
+        }
+        Some(sum)
+    };
+    let cuts = (0..header.len()).filter(|_| fields.len() == header.len() + 1);
+    let (cut, _) = cuts.filter_map(|cut| Some((cut, distance(cut)?))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((header.get(cut)?.as_str(), fields.get(cut)?, fields.get(cut + 1)?))
+}
+
 fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> Result<(), ReadError> {
     let fields = fields_of(line);
     if let Some(missing) = header.get(fields) {
@@ -521,6 +552,11 @@ fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> 
         ));
     }
     if fields > header.len() {
+        if let Some((name, whole, part)) = cut_by_its_comma(line, header, log) {
+            let found = format!("'{},{}', and so {fields} fields", short(whole), short(part));
+            let expected = format!("{} as in the header: a decimal comma? Write {}.{}", header.len(), short(whole), short(part));
+            return Err(place.refuse(Some(name), found, expected));
+        }
         let commas = fields + 1 >= 2 * header.len();
         let reason = if commas { ": a decimal comma? Write decimal points" } else { "" };
         return Err(place.refuse(None, format!("{fields} fields"), format!("{} as in the header{reason}", header.len())));
@@ -596,6 +632,26 @@ mod tests {
 
     fn parse(text: &str) -> Result<Log, String> {
         Log::parse("run.csv", text.as_bytes()).map_err(|e| e.to_string())
+    }
+
+    /// One number cut in two by its comma: of several places the one that makes the row most like the row before.
+    #[test]
+    fn a_decimal_comma_is_told_with_its_column() {
+        let read = |row: &str| {
+            let text = format!("# quadrig-log 1\nt_s,pulse_us,rpm,thrust_n\n0.1,1200,4000,2.5\n{row}\n");
+            Log::parse("run.csv", text.as_bytes()).expect_err("a field too many").to_string()
+        };
+        for (row, said) in [
+            ("0.2,1200,4010,2,6", "run.csv:4: column thrust_n: '2,6', and so 5 fields; expected 4 as in the header"),
+            ("0,2,1200,4010,2.6", "column t_s: '0,2', and so 5 fields"),
+            ("0.2,1200,4010,5,2.6", "column rpm: '4010,5', and so 5 fields"),
+            ("0.2,1200,4010,-2,6", "a decimal comma? Write -2.6"),
+        ] {
+            assert!(read(row).contains(said), "{row}: {}", read(row));
+        }
+        // nothing that could be one
+        let none = read("0.2,1200.0,4010.0,2.6,x");
+        assert!(none.contains("run.csv:4: 5 fields; expected 4"), "{none}");
     }
 
     #[test]
