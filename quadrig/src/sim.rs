@@ -146,17 +146,50 @@ fn flown(args: &Args, scenario: &Scenario, quiet: bool) -> Result<RunRecord, Fai
 
 /// Length of a run from which on its pace is tried before it starts, s.
 const TRIED_FROM_S: f64 = 600.0;
-/// How long the trial takes.
+/// How long the trial's piece of a run takes.
 const TRIAL: Duration = Duration::from_millis(150);
+/// How long it may take until it records.
+const UNTIL_RECORDED: Duration = Duration::from_secs(1);
 
 /// Times real time at which `runs` simulations like this one go on side by side, by a short trial; boundless for one that is over at once anyway.
 pub(crate) fn pace(scenario: &Scenario, runs: f64) -> f64 {
     if runs * scenario.run_s() < TRIED_FROM_S {
         return f64::INFINITY;
     }
+    let piece = tried(scenario);
+    piece.run_s / piece.took.as_secs_f64()
+}
+
+/// The first piece of a run.
+struct Piece {
+    /// How long it is, s.
+    run_s: f64,
+    /// How long it took, from the first sample to the written log.
+    took: Duration,
+    /// Its rows.
+    rows: usize,
+}
+
+/// Flies the first piece of a run as the run is flown: samples are sent, read back, and written as a log. Until the board is armed none of that
+/// is done, and a millisecond costs a fraction.
+fn tried(scenario: &Scenario) -> Piece {
     let (mut trial, begun) = (Session::new(scenario, None), Instant::now());
-    while begun.elapsed() < TRIAL && trial.step().unwrap_or(false) {}
-    trial.now_s() / begun.elapsed().as_secs_f64()
+    let mut goes_on = true;
+    while goes_on && trial.share() == 0.0 && begun.elapsed() < UNTIL_RECORDED {
+        goes_on = trial.step().unwrap_or(false);
+    }
+    let (from_s, begun) = (trial.now_s(), Instant::now());
+    while goes_on && begun.elapsed() < TRIAL {
+        goes_on = trial.step().unwrap_or(false);
+    }
+    let run_s = trial.now_s() - from_s;
+    let mut rows = 0;
+    if let Ok(record) = trial.finish() {
+        let log = to_log(scenario, &record, "", false);
+        rows = log.len();
+        let _ = log.write_to(&mut std::io::sink()); // it takes everything
+    }
+    Piece { run_s, took: begun.elapsed(), rows }
 }
 
 /// The firmware of `scenario` alone on the pins of `path`.
@@ -230,4 +263,29 @@ pub(crate) fn fly_model(scenario: &Scenario, model: &Model, like: &Log, name: &s
         }
     }
     Ok(log)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is tried is the run itself: it begins with the first sample, and has as many rows as the run has in that time.
+    #[test]
+    fn the_trial_flies_a_piece_of_the_run() {
+        let text = |rate: u32| {
+            format!(
+                "schedule = {{ kind = \"steps\", steps = [{{ pulse_us = 1500, hold_s = 5000 }}] }}\n[log]\nrate_hz = {rate}\n"
+            )
+        };
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run.toml");
+        for rate in [10, 1000] {
+            std::fs::write(&path, text(rate)).expect("a file");
+            let AnyScenario::Rig(scenario) = AnyScenario::load(&path).expect("a scenario") else { panic!("of a rig") };
+            let piece = tried(&scenario);
+            let rows = piece.run_s * f64::from(rate);
+            assert!(piece.run_s > 0.5 && piece.took >= TRIAL, "{} s", piece.run_s);
+            assert!((piece.rows as f64 - rows).abs() <= 2.0, "{} rows in {} s", piece.rows, piece.run_s);
+        }
+    }
 }
