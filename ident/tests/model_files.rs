@@ -7,7 +7,7 @@
 
 use ident::channel::Context;
 use ident::log::{Column, Log};
-use ident::model::{Model, beside};
+use ident::model::{FittedTo, Model, beside};
 use sha2::{Digest, Sha256};
 use std::fs;
 use tempfile::TempDir;
@@ -161,4 +161,14 @@ fn a_model_that_ends_early_is_refused() {
     fs::write(beside(&path), &second[..second.len() / 2]).expect("a file");
     let said = Model::read(&path).expect_err("half of it").to_string();
     assert!(said.contains("does not belong to this model") && said.contains("the whole file that was written with it"), "{said}");
+}
+
+/// A model of several runs names each of them, and one of a single run its log.
+#[test]
+fn a_model_says_whose_it_is() {
+    let one = model(0.2);
+    assert_eq!(one.runs_in_words(), "run.csv");
+    let run = |name: &str| FittedTo { name: name.into(), sha256: String::new(), rows: 9, date: None };
+    let all = Model { runs: ["a.csv", "b.csv", "c.csv"].map(run).to_vec(), ..one };
+    assert_eq!(all.runs_in_words(), "a.csv, b.csv and c.csv");
 }

@@ -51,6 +51,18 @@ where
     }
 }
 
+/// Milliampere-hours, a whole number from `low` to `high`; what may be ampere-hours is told as such.
+pub(crate) fn milliampere_hours(low: u32, high: u32) -> impl Fn(&str) -> Result<u32, Expected> + Clone + Send + Sync {
+    move |text| {
+        let found = text.trim().parse().ok().filter(|n| (low..=high).contains(n));
+        found.ok_or_else(|| {
+            let ah = text.trim().parse::<f64>().ok().filter(|ah| *ah > 0.0 && *ah < f64::from(low));
+            let hint = ah.map_or_else(String::new, |ah| format!(": is it in A.h? {ah} A.h are {:.0} mAh", 1000.0 * ah));
+            Expected(format!("expected mAh, a whole number from {low} to {high}{hint}"))
+        })
+    }
+}
+
 /// The line of a refusal that is one of these numbers'.
 pub(crate) fn refusal(error: &clap::Error) -> Option<String> {
     let expected = error.source()?.downcast_ref::<Expected>()?;

@@ -253,6 +253,18 @@ impl Model {
         self
     }
 
+    /// The runs that it is of, in words: each by its name.
+    #[must_use]
+    pub fn runs_in_words(&self) -> String {
+        match &self.runs[..] {
+            [] | [_] => self.source.clone(),
+            [all @ .., last] => {
+                let all: Vec<&str> = all.iter().map(|run| run.name.as_str()).collect();
+                format!("{} and {}", all.join(", "), last.name)
+            }
+        }
+    }
+
     /// Its effects that a board told (`close/marks.rs`): no prediction holds them, so no fit and no comparison of runs does.
     pub fn told_by_the_board(&self) -> impl Iterator<Item = &AddedEffect> {
         self.effects.iter().filter(|e| e.placed.instance.form == TOLD_BY_THE_BOARD)

@@ -100,7 +100,7 @@ impl Powerplant {
                 .unwrap_or(1.0),
             latency_s: rotor.latency_s(),
             row_latency_s: latency_of_rows_s(model),
-            source: model.source.clone(),
+            source: model.runs_in_words(),
             named: ["motor", "propeller"].map(text),
             pole_pairs: model.meta.get("pole_pairs").and_then(toml::Value::as_integer),
             lead_ohm: estimate("supply_sag", "resistance"),

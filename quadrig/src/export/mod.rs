@@ -56,7 +56,7 @@ pub(crate) struct Args {
     #[arg(long, value_parser = crate::number::whole::<u32>(1, 14, "cells"))]
     cells: Option<u32>,
     /// Capacity of that battery, mAh, as printed on it: no model knows it.
-    #[arg(long, value_name = "MAH", value_parser = crate::number::whole::<u32>(1, 100_000, "mAh"))]
+    #[arg(long, value_name = "MAH", value_parser = crate::number::milliampere_hours(100, 100_000))]
     capacity: Option<u32>,
     /// The rig ran on the battery and the leads that will fly: their resistance goes into the file (px4). A bench supply's does not belong there.
     #[arg(long)]

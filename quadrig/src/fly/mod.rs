@@ -177,7 +177,12 @@ fn powerplant(file: &AirframeFile, rotors: &Rotors, model: Option<&Model>) -> St
     let list = |names: &[&str]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
     let air = (!rotor.density().1).then_some("air of its run unknown, taken as 1.225 kg/m^3");
     let notes: String = rotor.lacks().into_iter().chain(air).map(|note| format!("; {note}")).collect();
-    format!("model of {}; its effects in flight: {}; of the rig alone: {}{notes}", model.source, list(&flies), list(&stays))
+    format!(
+        "model of {}; its effects in flight: {}; of the rig alone: {}{notes}",
+        model.runs_in_words(),
+        list(&flies),
+        list(&stays)
+    )
 }
 
 fn flown(

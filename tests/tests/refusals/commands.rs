@@ -100,6 +100,12 @@ pub(super) fn arguments() -> Vec<Case> {
         alone("a motor that nobody measured", "select --motor 1KV", &["--motor 1KV", "570KV"]),
         alone("a battery without charge", "select --capacity 0", &["--capacity 0", "a positive number"]),
         alone("a battery in mAh", "select --capacity 4400", &["--capacity 4400: expected A.h", "4400 mAh are 4.4 A.h"]),
+        alone(
+            "a battery to export in A.h",
+            "export model.toml --to px4 --capacity 1.5",
+            &["--capacity 1.5: expected mAh, a whole number from 100", "1.5 A.h are 1500 mAh"],
+        ),
+        alone("a whole battery to export in A.h", "export model.toml --to px4 --capacity 5", &["5 A.h are 5000 mAh"]),
         alone("a frame in grams", "select --bare 774", &["--bare 774: expected kg", "774 g are 0.774 kg"]),
         alone("a declination beyond the pole", "ahrs good.csv out.csv --declination 700", &["--declination 700", "-180 to 180"]),
         alone("a channel that is none", "plateaus good.csv --channel thrust", &["no column thrust", "thrust_n"]),
