@@ -12,6 +12,7 @@ use super::page::{Page, Reading};
 use super::sentence::{order, without};
 use super::state::figures;
 use super::vocabulary::Vocabulary;
+use crate::attribution::columns::UNKNOWN;
 use crate::attribution::rivals::UNEXPLAINED;
 use crate::report::figure::Figure;
 use crate::report::sheet::Sheet;
@@ -403,14 +404,18 @@ fn parameters(sheet: &mut Sheet, words: Vocabulary, e: &EffectEntry) {
     }
 }
 
+/// The causes that an effect is easily taken for. What was told with a probability is told; what has no name is no cause.
+fn taken_for<'a>(known: &'a [&'static str], against: &'a [Rival]) -> impl Iterator<Item = &'a str> {
+    let told = |id: &str| against.iter().any(|r| r.ids.iter().any(|known| known == id));
+    known.iter().copied().filter(move |id| *id != UNKNOWN && !told(id))
+}
+
 /// What would stand in its place, with probabilities, and what it is easily taken for.
 fn others(page: &Page<'_>, e: &EffectEntry, against: &[Rival]) -> String {
     let counted = against.iter().filter(|r| r.probability >= COUNTED);
     let found: Vec<String> = counted.map(|r| format!("{} ({})", plain(&r.said), probability(r.probability))).collect();
     let known = (page.words.about)(&e.id).map(|a| a.look_alikes).unwrap_or_default();
-    // what was told with a probability is told
-    let told = |id: &str| against.iter().any(|r| r.ids.iter().any(|known| known == id));
-    let alike: Vec<String> = known.iter().filter(|id| !told(id)).map(|id| in_short(&title(page, id)).to_owned()).collect();
+    let alike: Vec<String> = taken_for(known, against).map(|id| in_short(&title(page, id)).to_owned()).collect();
     let alike = if alike.is_empty() { String::new() } else { format!(" Easily taken for: {}.", alike.join("; ")) };
     // what every name leaves to causes that the library lacks is said once, above the cards
     let none = Rival::none(page.verdict, page.words, e, against).probability;
@@ -486,6 +491,13 @@ mod tests {
     fn a_title_is_told_in_short() {
         assert_eq!(in_short("slow meter: the channel is filtered"), "slow meter");
         assert_eq!(in_short("battery discharges during the run"), "battery discharges during the run");
+    }
+
+    /// A dependence without a name is no cause that another one could be taken for.
+    #[test]
+    fn what_has_no_name_is_no_cause() {
+        assert_eq!(taken_for(&["unknown", "supply_sag"], &[]).collect::<Vec<_>>(), ["supply_sag"]);
+        assert_eq!(taken_for(&["unknown"], &[]).count(), 0);
     }
 
     #[test]
