@@ -58,7 +58,7 @@ pub(crate) fn milliampere_hours(low: u32, high: u32) -> impl Fn(&str) -> Result<
         found.ok_or_else(|| {
             let ah = text.trim().parse::<f64>().ok().filter(|ah| *ah > 0.0 && *ah < f64::from(low));
             let hint = ah.map_or_else(String::new, |ah| format!(": is it in A.h? {ah} A.h are {:.0} mAh", 1000.0 * ah));
-            Expected(format!("expected mAh, a whole number from {low} to {high}{hint}"))
+            Expected(format!("expected mAh, a whole number from {low} to {high}") + &hint)
         })
     }
 }

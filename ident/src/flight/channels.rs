@@ -100,13 +100,13 @@ impl Channels {
             if layout {
                 made.push(Target::Turning(k), windows, windows.slope(&rate[k]), windows.floor_of_slope(&rate[k]));
             } else {
-                made.refuse(&Target::Turning(k).name(), "where the rotors sit is not known (metadata `layout` or `rotors_m`)");
+                made.leave_out(&Target::Turning(k).name(), "where the rotors sit is not known (metadata `layout` or `rotors_m`)");
             }
         }
         made.rates(record, windows);
         for (i, speed) in record.speed.iter().enumerate() {
             if record.command.is_empty() {
-                made.refuse(&Target::Speed(i).name(), "no pulse was logged");
+                made.leave_out(&Target::Speed(i).name(), "no pulse was logged");
             } else {
                 let rpm: Vec<f64> = speed.iter().map(|w| w * super::RPM).collect();
                 made.push(Target::Speed(i), windows, windows.mean(&rpm), windows.floor_of_mean(&rpm).max(resolution(&rpm)));
@@ -116,7 +116,7 @@ impl Channels {
             made.push(Target::Voltage, windows, windows.mean(voltage), windows.floor_of_mean(voltage).max(resolution(voltage)));
         }
         if record.current.is_some() {
-            made.refuse("current_a", "an input: the voltage follows from it");
+            made.leave_out("current_a", "an input: the voltage follows from it");
         }
         if let (Some(field), Some(_)) = (&record.field, &record.to_earth) {
             for (k, values) in field.iter().enumerate() {
@@ -141,9 +141,9 @@ impl Channels {
     fn push(&mut self, target: Target, windows: &Windows, y: Vec<f64>, floor: f64) {
         let size = y.iter().filter(|v| v.is_finite()).map(|v| v.abs()).fold(0.0, f64::max);
         if y.len() < FEWEST || y.iter().any(|v| !v.is_finite()) {
-            self.refuse(&target.name(), "too few readings in the air");
+            self.leave_out(&target.name(), "too few readings in the air");
         } else if y.iter().all(|v| (v - y[0]).abs() <= ROUNDING * size) {
-            self.refuse(
+            self.leave_out(
                 &target.name(),
                 &format!("reads {} {} throughout: nothing to explain", digits(y[0], FIGURES * y[0].abs()), target.unit()),
             );
@@ -154,7 +154,7 @@ impl Channels {
         }
     }
 
-    fn refuse(&mut self, name: &str, why: &str) {
+    fn leave_out(&mut self, name: &str, why: &str) {
         self.not_predicted.push((name.to_owned(), why.to_owned()));
     }
 

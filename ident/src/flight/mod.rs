@@ -40,7 +40,7 @@ pub const SHORTEST_S: f64 = 4.0;
 #[non_exhaustive]
 pub enum FlightError {
     /// It lacks a column.
-    #[error("{name}: holds {reason}; expected one of them at least")]
+    #[error("{name}: holds {reason}")]
     Lacks {
         /// Log.
         name: String,

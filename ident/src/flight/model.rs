@@ -128,7 +128,7 @@ impl FlightModel {
             refuse(line, e.message().lines().next().unwrap_or("not TOML").to_owned())
         })?;
         if model.format != FORMAT {
-            return Err(refuse(1, format!("format is {:?}; expected {FORMAT:?}", model.format)));
+            return Err(refuse(1, format!("format is {:?}; expected a flight's, {FORMAT:?}", model.format)));
         }
         let all = model.declared.iter().chain(model.effect.iter().flat_map(|e| e.shape.iter().chain(&e.amplitude)));
         if let Some(bad) = all.into_iter().find(|c| !(c.value.is_finite() && c.se.is_finite() && c.se >= 0.0)) {

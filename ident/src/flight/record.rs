@@ -89,7 +89,7 @@ impl Record {
     /// A log that holds neither specific force nor rate, or neither speeds nor commands of its rotors; a speed that reads nothing while another
     /// rotor turns; metadata that cannot be read.
     pub fn of(log: &Log) -> Result<Self, FlightError> {
-        let refuse = |reason: &str| FlightError::Lacks { name: log.name.clone(), reason: reason.to_owned() };
+        let lacks = |reason: &str| FlightError::Lacks { name: log.name.clone(), reason: reason.to_owned() };
         let vehicle = Vehicle::of(log).map_err(|reason| FlightError::Meta { name: log.name.clone(), reason })?;
         let (cleaned, spikes) = without_spikes(log);
         let log = &cleaned;
@@ -102,10 +102,12 @@ impl Record {
         let command = each("pulse_us_", &|us| (us - 1000.0) / 1000.0);
         let (force, rate) = (measured(log, "acc"), measured(log, "gyro"));
         if speed.is_empty() && command.is_empty() {
-            return Err(refuse("neither the speeds (rpm_1, ...) nor the pulses (pulse_us_1, ...) of all its rotors"));
+            return Err(lacks(
+                "neither the speeds nor the pulses of all its rotors; expected columns rpm_1, ... or pulse_us_1, ...: log one of them",
+            ));
         }
         if force.is_none() && rate.is_none() {
-            return Err(refuse("neither specific force (acc_x, ...) nor rate (gyro_x, ...)"));
+            return Err(lacks("neither specific force nor rate; expected columns acc_x, ... or gyro_x, ...: log one of them"));
         }
         if let Some(rotor) = silent(&speed) {
             return Err(FlightError::Silent { name: log.name.clone(), column: Target::Speed(rotor).name() });

@@ -107,7 +107,7 @@ impl InertialModel {
             refuse(line, e.message().lines().next().unwrap_or("not TOML").to_owned())
         })?;
         if model.format != FORMAT {
-            return Err(refuse(1, format!("format is {:?}; expected {FORMAT:?}", model.format)));
+            return Err(refuse(1, format!("format is {:?}; expected an attitude log's, {FORMAT:?}", model.format)));
         }
         Ok(model)
     }

@@ -51,13 +51,17 @@ pub(super) fn stepped_back<R: BufRead>(
     }
     let before = log.t.last().copied().unwrap_or(value);
     let start = log.t.first().copied().unwrap_or(value);
-    let reason = if back >= 3 && back as f64 >= SHUFFLED * rows as f64 {
-        format!("strictly increasing time; {back} of {rows} rows step back: the rows look shuffled, sort them by t_s")
-    } else if let Some((ahead, before)) = leapt_ahead(value, next, &log.t) {
+    let shuffled = back >= 3 && back as f64 >= SHUFFLED * rows as f64;
+    if let Some((ahead, usual)) = leapt_ahead(value, next, &log.t).filter(|_| !shuffled) {
         let (line, odd) = (lines.get(ahead).copied().unwrap_or(place.line), log.t.get(ahead).copied().unwrap_or(value));
-        let found = format!("{odd} leaps ahead, after {before}; line {} goes on at {value}", place.line);
-        let reason = "strictly increasing time; a glitch of the clock: take the row out, or mend its time";
-        return Ok(Place { file: place.file, line }.refuse(Some("t_s"), found, reason));
+        return Ok(Place { file: place.file, line }.refuse(
+            Some("t_s"),
+            format!("{odd} leaps ahead, after {usual}; line {} goes on at {value}", place.line),
+            "strictly increasing time; a glitch of the clock: take the row out, or mend its time",
+        ));
+    }
+    let reason = if shuffled {
+        format!("strictly increasing time; {back} of {rows} rows step back: the rows look shuffled, sort them by t_s")
     } else if back == 1 && log.len() >= ENOUGH && value - start < 0.1 * (before - start) {
         "strictly increasing time; a second run, or a clock that began anew: give each run a file of its own".to_owned()
     } else {

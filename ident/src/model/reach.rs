@@ -95,12 +95,20 @@ pub(super) fn read(instance: &Instance, amplitudes: usize, value: &Value) -> Res
     let of_channel = |(channel, own): (&String, &Value)| {
         let place = |key: &str| format!("seen.{channel}{}{key}", if key.is_empty() { "" } else { "." });
         if !instance.channels.contains(channel) {
-            return Err(refusal(&place(""), Some(own), &format!("one of {}", instance.channels.join(", "))));
+            return Err(refusal(
+                &place(""),
+                Some(own),
+                &format!("one of the channels that it acts on: {}", instance.channels.join(", ")),
+            ));
         }
-        let own = own.as_table().ok_or_else(|| refusal(&place(""), Some(own), "a table"))?;
+        let own = own
+            .as_table()
+            .ok_or_else(|| refusal(&place(""), Some(own), "a table with the lowest and the highest that it adds"))?;
         let number = |key: &String| {
             let value = own.get(key);
-            value.and_then(finite).ok_or_else(|| refusal(&place(key), value, "a finite number"))
+            value
+                .and_then(finite)
+                .ok_or_else(|| refusal(&place(key), value, "a finite number in the unit that its key ends with"))
         };
         let [lowest, highest] = keys(channel);
         let seen = [number(&lowest)?, number(&highest)?];

@@ -133,19 +133,23 @@ impl Model {
             model.highest_pulse_us = Some(highest.ok_or_else(wanted)?);
         }
         if let Some(stood) = root.get(STOOD) {
-            model.stood = stood.as_bool().ok_or_else(|| refusal(STOOD, Some(stood), "true or false"))?;
+            model.stood = stood
+                .as_bool()
+                .ok_or_else(|| refusal(STOOD, Some(stood), "true or false: whether its runs saw the rotor stand still"))?;
         }
         if let Some(air) = root.get("air_density_ratio") {
             let ratio = finite(air).filter(|r| *r > 0.0);
             model.air = Some(ratio.ok_or_else(|| refusal("air_density_ratio", Some(air), "a finite number above zero"))?);
         }
         if let Some(consensus) = root.get("consensus") {
-            let table = consensus.as_table().ok_or_else(|| refusal("consensus", Some(consensus), "a table"))?;
+            let table = consensus
+                .as_table()
+                .ok_or_else(|| refusal("consensus", Some(consensus), "a table with rule, channels and sensor_share"))?;
             only(table, &["rule", "channels", "sensor_share"]).map_err(|refusal| within("consensus", refusal))?;
         }
         if let Some(channels) = root.get("consensus").and_then(|c| c.get("channels")) {
-            model.consensus =
-                strings(channels).ok_or_else(|| refusal("consensus.channels", Some(channels), "a list of channels"))?;
+            model.consensus = strings(channels)
+                .ok_or_else(|| refusal("consensus.channels", Some(channels), "a list of speed channels, such as [\"rpm\"]"))?;
         }
         if let Some(share) = root.get("consensus").and_then(|c| c.get("sensor_share")) {
             let known = finite(share).filter(|s| (0.0..=1.0).contains(s));
@@ -252,7 +256,8 @@ fn polynomial(channel: &str, value: &Value) -> Result<Polynomial, Refusal> {
     let farthest = FARTHEST[usize::from(!channel.starts_with("rpm"))];
     let read = |key: &String| {
         let value = table.get(key);
-        let found = value.and_then(finite).ok_or_else(|| refusal(key, value, "a finite number"))?;
+        let found =
+            value.and_then(finite).ok_or_else(|| refusal(key, value, "a finite number in the unit that its key ends with"))?;
         within_reach(found, farthest).ok_or_else(|| refusal(key, value, &format!("what a rig can have, {farthest:e} at most")))
     };
     let coefficients = keys[..count].iter().map(read).collect::<Result<_, _>>()?;
@@ -293,19 +298,25 @@ impl AddedEffect {
     pub(super) fn from_table(value: &Value) -> Result<Self, Refusal> {
         only(value.as_table().ok_or_else(|| refusal("", Some(value), "a table, [[effect]]"))?, &EFFECT)?;
         let at = |k: &str| value.get(k);
-        let id = at("id").and_then(Value::as_str).ok_or_else(|| refusal("id", at("id"), "the id of an effect"))?;
+        let id = at("id")
+            .and_then(Value::as_str)
+            .ok_or_else(|| refusal("id", at("id"), "the id of an effect: docs/effects lists them"))?;
         let effect = effects::by_id(id).ok_or_else(|| {
             let known: Vec<&str> = effects::library().iter().map(|e| e.id()).collect();
             refusal("id", at("id"), &format!("one of {}", known.join(", ")))
         })?;
         let channels = at("channels").and_then(strings).filter(|c| !c.is_empty());
-        let channels = channels.ok_or_else(|| refusal("channels", at("channels"), "a list of channels"))?;
+        let channels = channels.ok_or_else(|| {
+            refusal("channels", at("channels"), "a list of the channels that it acts on, such as [\"rpm\", \"thrust_n\"]")
+        })?;
         if let Some(unknown) = channels.iter().find(|c| Relation::of(c, true).is_none()) {
             return Err(no_channel("channels", unknown));
         }
         let form = match at("form") {
             None => "",
-            Some(form) => form.as_str().ok_or_else(|| refusal("form", Some(form), "a text"))?,
+            Some(form) => {
+                form.as_str().ok_or_else(|| refusal("form", Some(form), "a text in quotes, the name of one of its forms"))?
+            }
         };
         let instance = Instance { channels, form: form.to_owned() };
         let names = shape_names(effect, &instance);
@@ -361,7 +372,11 @@ fn amplitudes(
         Some(value) => value.as_table().ok_or_else(|| refusal("amplitude", Some(value), "one table for each channel"))?,
     };
     if let Some((channel, value)) = table.iter().find(|(channel, _)| !instance.channels.contains(channel)) {
-        return Err(refusal(&format!("amplitude.{channel}"), Some(value), &format!("one of {}", instance.channels.join(", "))));
+        return Err(refusal(
+            &format!("amplitude.{channel}"),
+            Some(value),
+            &format!("one of the channels that it acts on: {}", instance.channels.join(", ")),
+        ));
     }
     let keys: Vec<String> = effect.amplitudes(instance).iter().map(|a| keyed(a.name, a.unit)).collect();
     let mut out = Vec::new();
@@ -375,7 +390,8 @@ fn amplitudes(
                     let wanted = if keys.is_empty() { "no key".to_owned() } else { format!("a key of {}", keys.join(", ")) };
                     refusal(&place(key), Some(value), &wanted)
                 })?;
-                let found = finite(value).ok_or_else(|| refusal(&place(key), Some(value), "a finite number"))?;
+                let found = finite(value)
+                    .ok_or_else(|| refusal(&place(key), Some(value), "a finite number in the unit that its key ends with"))?;
                 let size = if key.ends_with("_ohm") {
                     Some(found).filter(|ohm| (0.0..=RESISTANCE).contains(ohm)).ok_or(format!("from 0 to {RESISTANCE} ohm"))
                 } else {
@@ -396,13 +412,19 @@ fn means(instance: &Instance, value: &Value) -> Result<Vec<(String, Vec<f64>)>, 
     let of_channel = |(channel, own): (&String, &Value)| {
         let place = format!("on_another_run.{channel}");
         if !instance.channels.contains(channel) {
-            return Err(refusal(&place, Some(own), &format!("one of {}", instance.channels.join(", "))));
+            return Err(refusal(
+                &place,
+                Some(own),
+                &format!("one of the channels that it acts on: {}", instance.channels.join(", ")),
+            ));
         }
         let table = own.as_table().ok_or_else(|| refusal(&place, Some(own), "a table of coefficients"))?;
         let of = |k: usize| -> Result<f64, Refusal> {
             let key = coefficient_key(channel, k);
             let value = table.get(&key);
-            value.and_then(finite).ok_or_else(|| refusal(&format!("{place}.{key}"), value, "a finite number"))
+            value
+                .and_then(finite)
+                .ok_or_else(|| refusal(&format!("{place}.{key}"), value, "a finite number in the unit that its key ends with"))
         };
         Ok((channel.clone(), (0..table.len()).map(of).collect::<Result<_, _>>()?))
     };
@@ -437,7 +459,9 @@ fn estimates(held: &[Held], value: &Value) -> Result<Vec<Estimate>, Refusal> {
     let mut out = Vec::new();
     for (key, value) in table {
         let place = format!("parameter.{key}");
-        let read = number(value).ok_or_else(|| refusal(&place, Some(value), "a number"))?;
+        let read = number(value).ok_or_else(|| {
+            refusal(&place, Some(value), "a number: what was estimated, for the reader; a line that tells nothing may go")
+        })?;
         let of = key.strip_suffix("_se").unwrap_or(key);
         let names = |h: &&Held| of.strip_prefix(h.name).is_some_and(|unit| unit.is_empty() || unit.starts_with('_'));
         let longest = held.iter().filter(names).map(|h| h.name.len()).max();

@@ -90,7 +90,9 @@ fn level(value: &Value) -> Result<RunLevel, Refusal> {
             let of = |k: usize| {
                 let key = coefficient_key(name, k);
                 let value = own.get(&key);
-                value.and_then(finite).ok_or_else(|| refusal(&format!("{place}.{key}"), value, "a finite number"))
+                value.and_then(finite).ok_or_else(|| {
+                    refusal(&format!("{place}.{key}"), value, "a finite number in the unit that its key ends with")
+                })
             };
             out.polynomials.push((name.clone(), (0..own.len()).map(of).collect::<Result<_, _>>()?));
         }

@@ -64,10 +64,9 @@ struct Burst {
 
 /// Runs the command.
 pub(super) fn run(board: &mut Board, args: &Args, quiet: bool) -> Result<(), Failure> {
-    let place = super::file::ANALOGUE
-        .iter()
-        .position(|n| *n == args.channel)
-        .ok_or_else(|| format!("{:?}: no such channel; expected one of {}", args.channel, super::file::ANALOGUE.join(", ")))?;
+    let place = super::file::ANALOGUE.iter().position(|n| *n == args.channel).ok_or_else(|| {
+        format!("{:?}: no such channel; expected one that the board samples: {}", args.channel, super::file::ANALOGUE.join(", "))
+    })?;
     if !configure::in_force(board)?.fitted[place] {
         return Err(
             format!("{} is not fitted on this board; expected a channel of `quadrig rig identify`", ADC_NAMES[place]).into()

@@ -35,13 +35,13 @@ const RECORDINGS: [Recording; 2] = [
         endings: &["ulg", "ulog"],
         magic: &super::ulog::MAGIC,
         name: "PX4 log (ULog)",
-        whole: "the .ulg file as the board wrote it: copy it from the card once more",
+        whole: "copy it from the card once more",
     },
     Recording {
         endings: &["bbl", "bfl"],
         magic: super::blackbox::MAGIC,
         name: "Betaflight Blackbox log",
-        whole: "the file as the board wrote it: save it from the flash or the card once more",
+        whole: "save it from the flash or the card once more",
     },
 ];
 
@@ -121,7 +121,11 @@ fn no_recording(file: &str, head: &[u8]) -> Result<(), ReadError> {
         }
         if r.endings.contains(&ending.as_str()) {
             let what = if head.is_empty() { "is empty" } else { "does not begin as one" };
-            return Err(place.refuse(None, format!("by its name a {}, but it {what}", r.name), r.whole));
+            return Err(place.refuse(
+                None,
+                format!("by its name a {}, but it {what}", r.name),
+                format!("the file as the board wrote it: {}", r.whole),
+            ));
         }
     }
     Ok(())
