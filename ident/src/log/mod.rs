@@ -645,7 +645,7 @@ mod tests {
             ("0.2,1200,4010,2,6", "run.csv:4: column thrust_n: '2,6', and so 5 fields; expected 4 as in the header"),
             ("0,2,1200,4010,2.6", "column t_s: '0,2', and so 5 fields"),
             ("0.2,1200,4010,5,2.6", "column rpm: '4010,5', and so 5 fields"),
-            ("0.2,1200,4010,-2,6", "a decimal comma? Write -2.6"),
+            ("0.2,1200,4010,-0,6", "a decimal comma? Write -0.6"),
         ] {
             assert!(read(row).contains(said), "{row}: {}", read(row));
         }

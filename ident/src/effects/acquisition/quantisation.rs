@@ -53,8 +53,9 @@ impl Effect for Quantisation {
     fn instances(&self, context: &Context) -> Vec<Instance> {
         let rounds = |t: &&Target| matches!(t.relation, Relation::Thrust | Relation::Torque | Relation::Current);
         let beneath = |t: &Target| beneath_noise::grid(context, t).is_some();
+        let unseen = if context.against_model { BENEATH } else { BY_LEVELS };
         let seen = |t: &Target| {
-            let form = if step(t).is_some() { Some("") } else { beneath(t).then_some(BENEATH) };
+            let form = if step(t).is_some() { Some("") } else { beneath(t).then_some(unseen) };
             form.map(|form| Instance::new(&[t.name], form))
         };
         context.targets.iter().filter(rounds).filter_map(seen).collect()
@@ -64,12 +65,12 @@ impl Effect for Quantisation {
         // read off the values, not fitted
         let target = context.targets.iter().find(|t| instance.touches(t.name));
         let of = |name, found| Shape { name, unit: "channel", range: (found, found), starts: vec![found] };
-        if instance.form != BENEATH {
+        if instance.form.is_empty() {
             return vec![of("step", target.and_then(step).unwrap_or(0.0))];
         }
         let (step, offset) = target.and_then(|t| beneath_noise::grid(context, t)).map_or((0.0, 0.0), |g| (g.step, g.offset));
         // a relation that is fitted to these readings has their zero
-        if !context.against_model {
+        if instance.form == BY_LEVELS {
             return vec![of("step", step), of("offset", offset)];
         }
         // by how much the zero is another one than the model's: a level that falls on the wrong side of an edge is off by a whole step
@@ -83,7 +84,7 @@ impl Effect for Quantisation {
     }
 
     fn seen(&self, context: &Context, instance: &Instance) -> f64 {
-        if instance.form == BENEATH {
+        if !instance.form.is_empty() {
             return 0.0;
         }
         // of readings without steps each lies a quarter of a step from the next multiple, on average
@@ -120,7 +121,7 @@ impl Effect for Quantisation {
     fn report(&self, context: &Context, instance: &Instance, mut fitted: Vec<Estimate>) -> Vec<Estimate> {
         let noise = context.targets.iter().find(|t| instance.touches(t.name)).map_or(f64::NAN, |t| t.noise.rms);
         let of_levels = noise / (context.steady.len().max(1) as f64).sqrt();
-        for e in fitted.iter_mut().filter(|_| instance.form == BENEATH && !context.against_model) {
+        for e in fitted.iter_mut().filter(|_| instance.form == BY_LEVELS) {
             match e.name.as_str() {
                 "step" => e.se = 1e-3 * e.value,
                 "offset" => e.se = of_levels,
@@ -149,6 +150,8 @@ fn round(v: f64, edge: f64) -> f64 {
 
 /// Form in which noise comes after the rounding, so that no reading lies on the grid.
 const BENEATH: &str = "beneath the noise";
+/// The same where no declared model knows the truth: the run's own levels say where it lies.
+const BY_LEVELS: &str = "beneath the noise by its levels";
 
 /// The truth as the relation's own columns give it, moved until each reading is its rounding wherever they can.
 fn within_steps(context: &Context, target: &Target, design: &TargetDesign, step: f64) -> Option<Vec<f64>> {
