@@ -167,6 +167,7 @@ struct Piece {
     /// How long it took, from the first sample to the written log.
     took: Duration,
     /// Its rows.
+    #[cfg_attr(not(test), expect(dead_code, reason = "a test asks whether what is tried is the run itself"))]
     rows: usize,
 }
 
