@@ -7,14 +7,14 @@
 //! Reference: Widrow & Kollar 2008, *Quantization Noise*.
 
 use crate::channel::lattice::{lattice, step};
-use crate::channel::{Context, Relation, STANDSTILL, Target, unit_of};
+use crate::channel::{Context, STANDSTILL, Target, unit_of};
 use crate::effects::design::TargetDesign;
 use crate::effects::{About, Amplitude, Clause, Effect, EffectEntry, Estimate, Instance, Scope, Shape, Stage};
 use crate::numeric::solve::Normal;
 
 mod beneath_noise;
 
-use beneath_noise::Grid;
+use beneath_noise::{Grid, levels, mean, rounds};
 
 /// See the module.
 pub(crate) struct Quantisation;
@@ -51,14 +51,13 @@ impl Effect for Quantisation {
     }
 
     fn instances(&self, context: &Context) -> Vec<Instance> {
-        let rounds = |t: &&Target| matches!(t.relation, Relation::Thrust | Relation::Torque | Relation::Current);
         let beneath = |t: &Target| beneath_noise::grid(context, t).is_some();
         let unseen = if context.against_model { BENEATH } else { BY_LEVELS };
         let seen = |t: &Target| {
             let form = if step(t).is_some() { Some("") } else { beneath(t).then_some(unseen) };
             form.map(|form| Instance::new(&[t.name], form))
         };
-        context.targets.iter().filter(rounds).filter_map(seen).collect()
+        context.targets.iter().filter(|t| rounds(t)).filter_map(seen).collect()
     }
 
     fn shapes(&self, context: &Context, instance: &Instance) -> Vec<Shape> {
@@ -168,16 +167,11 @@ fn within_steps(context: &Context, target: &Target, design: &TargetDesign, step:
 /// The same where noise comes after the rounding: each level is a sample, and reads the line of the grid that it lies by.
 fn within_lines(context: &Context, target: &Target, design: &TargetDesign, grid: &Grid) -> Option<Vec<f64>> {
     let mut samples = Samples::default();
-    for (from, to) in &context.steady {
-        let at = target.rows.partition_point(|row| row < from)..target.rows.partition_point(|row| row < to);
-        let (Some(rows), Some(y)) = (target.rows.get(at.clone()), target.y.get(at)) else { continue };
-        if rows.is_empty() {
-            continue;
-        }
-        let mean = |values: &[f64]| rows.iter().filter_map(|row| values.get(*row)).sum::<f64>() / rows.len() as f64;
-        samples.columns.extend(design.columns.iter().map(|c| mean(&c.values)));
-        samples.known.push(mean(&design.fixed));
-        samples.readings.push(grid.line(y.iter().sum::<f64>() / y.len() as f64));
+    for (rows, readings) in levels(context, target) {
+        let of_rows = |values: &[f64]| rows.iter().filter_map(|row| values.get(*row)).sum::<f64>() / rows.len() as f64;
+        samples.columns.extend(design.columns.iter().map(|c| of_rows(&c.values)));
+        samples.known.push(of_rows(&design.fixed));
+        samples.readings.push(grid.line(mean(readings)));
     }
     // on an edge a level would read what lies between two lines
     let half = (0.5 * grid.step - CLEAR * EDGE * target.noise.rms).max(0.0);

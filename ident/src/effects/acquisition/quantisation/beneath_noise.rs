@@ -6,7 +6,7 @@
 //! Units: the channel's.
 //! Reference: directional statistics, Mardia & Jupp 2000, section 5.2; Rayleigh's test, section 6.3.
 
-use crate::channel::{Context, Target};
+use crate::channel::{Context, Relation, Target};
 use crate::effects::NEEDED_EVIDENCE;
 
 impl Grid {
@@ -38,8 +38,37 @@ const MOST: usize = 4000;
 /// Trials on either side of the best, and how much finer they lie.
 const FINER: (i32, f64) = (10, 10.0);
 
-/// The grid of a channel, where it has one; the load must be held for the reading to be one of it.
+/// The grid of a channel, where it has one.
 pub(super) fn grid(context: &Context, target: &Target) -> Option<Grid> {
+    let of_all = || context.targets.iter().map(|t| found(context, t).map(|g| [g.step, g.offset])).collect();
+    let [step, offset] = context.facts.grids.get_or_init(of_all).get(context.target(target.name)?).copied().flatten()?;
+    Some(Grid { step, offset })
+}
+
+/// Whether a channel is one whose meter may round.
+pub(super) fn rounds(target: &Target) -> bool {
+    matches!(target.relation, Relation::Thrust | Relation::Torque | Relation::Current)
+}
+
+/// The rows and the readings of each level of a target that has any.
+pub(super) fn levels<'c>(context: &'c Context, target: &'c Target) -> impl Iterator<Item = (&'c [usize], &'c [f64])> {
+    let of = |(from, to): &(usize, usize)| {
+        let at = target.rows.partition_point(|row| row < from)..target.rows.partition_point(|row| row < to);
+        Some((target.rows.get(at.clone())?, target.y.get(at)?))
+    };
+    context.steady.iter().filter_map(of).filter(|(rows, _)| !rows.is_empty())
+}
+
+/// The mean of the readings of a level.
+pub(super) fn mean(readings: &[f64]) -> f64 {
+    readings.iter().sum::<f64>() / readings.len() as f64
+}
+
+/// The grid is looked for once; the load must be held for the reading to be one of it.
+fn found(context: &Context, target: &Target) -> Option<Grid> {
+    if !rounds(target) {
+        return None;
+    }
     let mut held = vec![false; context.len()];
     context.steady.iter().for_each(|(from, to)| held[*from..*to].fill(true));
     let rows = target.rows.iter().zip(&target.y).filter(|(row, _)| held[**row] && target.claims(**row));
@@ -69,13 +98,7 @@ pub(super) fn grid(context: &Context, target: &Target) -> Option<Grid> {
 
 /// How much rarer than by chance the levels of a run gather about the lines of a grid, nats: of each line that any level lies by, one level counts.
 fn beyond_chance(context: &Context, target: &Target, grid: &Grid) -> f64 {
-    let of_rows = |(from, to): &(usize, usize)| {
-        let first = target.rows.partition_point(|row| row < from);
-        let last = target.rows.partition_point(|row| row < to);
-        let level = target.y.get(first..last).filter(|level| !level.is_empty())?;
-        Some(level.iter().sum::<f64>() / level.len() as f64)
-    };
-    let mut levels: Vec<f64> = context.steady.iter().filter_map(of_rows).collect();
+    let mut levels: Vec<f64> = levels(context, target).map(|(_, readings)| mean(readings)).collect();
     levels.sort_unstable_by(f64::total_cmp);
     levels.dedup_by(|b, a| *b - *a < 0.5 * grid.step);
     // Rayleigh's test
@@ -115,6 +138,9 @@ mod tests {
         let found = grid(&coarse, thrust).expect("a grid");
         assert!((found.step - 0.15).abs() < 0.001, "{found:?} {}", thrust.noise.rms);
         assert!((found.offset - 0.04).abs() < 0.01, "{found:?}");
+        // of few lines levels may lie by each by chance, and no model says that they ought to
+        let few = context(&|thrust| 1.5 * (thrust / 1.5).round() + 0.04);
+        assert_eq!(grid(&few, &few.targets[few.target("thrust_n").expect("a thrust")]), None);
         assert!(gather(&[0.1, 0.4, 0.7], 1.0 / 0.3).0 > 0.999 && gather(&[0.0, 0.1, 0.2, 0.3], 2.5).0 < 1e-9);
     }
 }
