@@ -110,8 +110,8 @@ impl<C: Borrow<Config>> Dcm<C> {
             return;
         }
         let ([x, y, z], k) = (*mean, inverse_sqrt(long));
-        // beyond 90 degrees the sine shrinks again: any turn leads out; at 90 one about a mean along x would not
-        let by = if z <= 0.0 { [-y * k, x * k, 0.0] } else { [0.5, 0.0, 0.0] };
+        // beyond 90 degrees the sine shrinks again: half a radian about x leads out
+        let by = [if z > 0.0 { 0.5 } else { -y * k }, x * k, 0.0];
         if !self.rest.now {
             self.bias.take_tilt(&config.bias, &by, dt);
         }
