@@ -87,6 +87,39 @@ pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec
         .collect()
 }
 
+/// Held-out error of each target by the fit without the effect at a position of a whole one. What a fold does not know of the others, an instant in it or
+/// an end of the range that it alone shows, it guesses as it does in the whole: a guess that differs must not decide about that effect.
+#[must_use]
+pub(crate) fn errors_without(
+    context: &Context,
+    declared: Declared<'_>,
+    (whole, position): (&Fit, usize),
+    without: &Fit,
+    folds: &[Vec<bool>],
+) -> Vec<Held> {
+    let others = |placed: &[Placed]| {
+        let kept = placed.iter().enumerate().filter(|(k, _)| *k != position);
+        kept.map(|(_, p)| p.shape.clone()).collect::<Vec<_>>()
+    };
+    let known = others(&whole.placed);
+    let all: Vec<usize> = (0..without.placed.len()).collect();
+    let guess = |keep: &[bool]| {
+        let guessed = others(&refine(context, declared, &whole.placed, Rows::Where(keep), EVALUATIONS));
+        let mut start = without.placed.clone();
+        for (p, (guessed, known)) in start.iter_mut().zip(guessed.iter().zip(&known)) {
+            let shapes = p.effect.shapes(context, &p.instance);
+            for ((v, shape), (guessed, known)) in p.shape.iter_mut().zip(shapes).zip(guessed.iter().zip(known)) {
+                *v = (*v + guessed - known).clamp(shape.range.0, shape.range.1);
+            }
+        }
+        let found = refine(context, declared, &start, Rows::Where(keep), EVALUATIONS);
+        unfelt_stay(context, declared, &start, (found, &all), keep)
+    };
+    let wanted = vec![true; context.targets.len()];
+    let pooled = pooled(context, declared, folds, &wanted, without, &guess);
+    pooled.into_iter().map(|e| e.unwrap_or(Held::UNKNOWN)).collect()
+}
+
 /// What the newest effect does to the held-out errors, by target.
 #[derive(Debug, Clone)]
 pub struct Around {
@@ -127,7 +160,7 @@ pub fn errors_around_newest(
     for out in folds {
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
         let placed = refine_group(context, declared, &fit.placed, &[others.len()], Rows::Where(&keep), EVALUATIONS);
-        let placed = unfelt_stay(context, declared, &fit.placed, placed, &keep);
+        let placed = unfelt_stay(context, declared, &fit.placed, (placed, &[others.len()]), &keep);
         let (mut with, mut without) = (Designs::new(context, declared, &placed), Designs::new(context, declared, others));
         let targets = context.targets.iter().zip(&mut sums).enumerate();
         for (k, (target, sums)) in targets.filter(|(_, (t, _))| newest.instance.touches(t.name)) {
