@@ -228,7 +228,10 @@ pub(crate) fn left_out(
 ) -> Vec<Sum> {
     let mut sums = vec![Sum::default(); context.targets.len()];
     let keep: Vec<bool> = out.iter().map(|o| !o).collect();
-    let taught = |p: Placed| Placed { shape: p.effect.taught(context, &p.instance, &p.shape, &keep), ..p };
+    let taught = |p: Placed| {
+        let known = Placed { shape: p.effect.taught(context, &p.instance, &p.shape, &keep), ..p };
+        in_the_middle(context, known, &keep)
+    };
     let placed: Vec<Placed> = refined(&keep).into_iter().map(taught).collect();
     let mut designs = Designs::new(context, declared, &placed);
     for (k, (target, sum)) in context.targets.iter().zip(&mut sums).enumerate().filter(|(k, _)| wanted[*k]) {
@@ -239,6 +242,22 @@ pub(crate) fn left_out(
         }
     }
     sums
+}
+
+/// An effect whose instants within rows that are left out are in the middle of these: the kept rows do not tell them, and the middle is the guess that is
+/// wrong by least.
+fn in_the_middle(context: &Context, mut placed: Placed, keep: &[bool]) -> Placed {
+    let shapes = placed.effect.shapes(context, &placed.instance);
+    for (v, _) in placed.shape.iter_mut().zip(shapes).filter(|(_, s)| s.is_instant()) {
+        let row = context.t.partition_point(|t| t < v).min(keep.len().saturating_sub(1));
+        if keep.get(row).copied().unwrap_or(true) {
+            continue;
+        }
+        let from = keep[..row].iter().rposition(|k| *k).map_or(0, |k| k + 1);
+        let to = keep[row..].iter().position(|k| *k).map_or(keep.len(), |k| row + k) - 1;
+        *v = 0.5 * (context.t[from] + context.t[to]);
+    }
+    placed
 }
 
 /// Sums over rows that were left out.

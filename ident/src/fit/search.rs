@@ -160,8 +160,7 @@ pub(crate) fn connected(placed: &[Placed], k: usize) -> Vec<usize> {
 }
 
 /// First steps from the optimum of all rows to that of a part of them, as a share of those from a grid's point: what a fold leaves out moves it by a
-/// fraction of its standard error. Larger ones cost a search of few evaluations all of them, and it ends far along any ridge. An instant takes the
-/// whole step: in a stretch that is left out it is guessed anew.
+/// fraction of its standard error. Larger ones cost a search of few evaluations all of them, and it ends far along any ridge.
 const NEAR: f64 = 0.1;
 
 /// Improves the shapes of the effects at the positions of `group` together, the others as they are.
@@ -173,8 +172,7 @@ pub(crate) fn refine_group(
     rows: Rows<'_>,
     evaluations: usize,
 ) -> Vec<Placed> {
-    let shapes: Vec<Shape> = placed.iter().flat_map(|p| p.effect.shapes(context, &p.instance)).collect();
-    let ranges: Vec<(f64, f64)> = shapes.iter().map(|s| s.range).collect();
+    let ranges: Vec<(f64, f64)> = placed.iter().flat_map(|p| p.effect.shapes(context, &p.instance)).map(|s| s.range).collect();
     let start: Vec<f64> = placed.iter().flat_map(|p| p.shape.iter().copied()).collect();
     let owner: Vec<usize> = placed.iter().enumerate().flat_map(|(k, p)| std::iter::repeat_n(k, p.shape.len())).collect();
     let free: Vec<usize> = (0..start.len()).filter(|i| ranges[*i].1 > ranges[*i].0 && group.contains(&owner[*i])).collect();
@@ -203,9 +201,8 @@ pub(crate) fn refine_group(
         };
         let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
         let widths = free.iter().map(|i| (start[*i].abs(), ranges[*i].1 - ranges[*i].0));
-        let near = |i: usize| if matches!(rows, Rows::Where(_)) && !shapes[i].is_instant() { NEAR } else { 1.0 };
-        let steps = widths.zip(&free).map(|((at, width), i)| near(*i) * (0.15 * at).max(0.01 * width).min(0.2 * width));
-        let steps: Vec<f64> = steps.collect();
+        let near = if matches!(rows, Rows::Where(_)) { NEAR } else { 1.0 };
+        let steps: Vec<f64> = widths.map(|(at, width)| near * (0.15 * at).max(0.01 * width).min(0.2 * width)).collect();
         let best = with_shapes(placed, &inside(&nelder_mead(&cost, &x0, &steps, evaluations)));
         group.iter().map(|k| best[*k].shape.clone()).collect()
     });
