@@ -110,7 +110,7 @@ impl<C: Borrow<Config>> Dcm<C> {
             return;
         }
         let ([x, y, z], k) = (*mean, inverse_sqrt(long));
-        // beyond 90 degrees the sine shrinks again: half a radian about x leads out
+        // beyond 90 degrees the sine shrinks again: half a radian about x, whatever there is about y, leads out
         let by = [if z > 0.0 { 0.5 } else { -y * k }, x * k, 0.0];
         if !self.rest.now {
             self.bias.take_tilt(&config.bias, &by, dt);
@@ -158,6 +158,24 @@ mod tests {
             let [_, _, z] = dcm.tilt.value();
             let long = root(square(&force));
             assert!((z / long + 1f32.sin()).abs() < 2e-3, "{force:?}: a turn of one radian, {z}");
+        }
+    }
+
+    /// Wherever beyond a right angle the mean points, a few turns bring it down: no axis is that of a mean that stays.
+    #[test]
+    fn every_tilt_beyond_a_right_angle_leads_out() {
+        for (k, z) in (0..72).flat_map(|k| [1e-3f32, 0.05, 0.3, 0.7, 1.0].map(|z| (k, z))) {
+            let (y, x) = crate::trig::sin_cos((5.0 * k as f32).to_radians());
+            let level = 9.0 * (1.0 - z * z).sqrt();
+            let force = [x * level, y * level, 9.0 * z];
+            let mut dcm = averaged(force);
+            let turned = (1..=20).find(|_| {
+                dcm.summed = 0.035;
+                dcm.level(&force, &mut Step::default());
+                let [_, _, z] = dcm.tilt.value();
+                *z < -8.9
+            });
+            assert!(turned.is_some(), "{force:?}: {:?}", dcm.tilt.value());
         }
     }
 
