@@ -67,6 +67,17 @@ fn a_broken_blade_is_told_as_one_cause() {
     }
 }
 
+/// Faults that the search, its held-out stretches or a missing declared model have hidden before: a sensor that leaves the others beside a rotor's lag,
+/// a gain that changes by little beside a load cell's lag, and a hold whose noise comes after it.
+#[test]
+fn what_stands_beside_a_lag_is_found() {
+    let folder = TempDir::new().unwrap();
+    for (effect, seed) in [("coupling_slip", "103"), ("gain_change", "102"), ("sample_hold", "103")] {
+        let out = demo(folder.path(), &["--seed", seed, "--effect", effect]);
+        assert!(out.contains(&format!("hidden was {effect}: found")) && !out.contains("named, and false"), "{out}");
+    }
+}
+
 /// A blade that breaks right behind the edge of a stretch that a fold leaves out: what it does to the current is learnt from that stretch alone.
 #[test]
 fn a_blade_that_breaks_at_the_edge_of_a_fold_keeps_its_name() {

@@ -7,6 +7,7 @@
 
 use crate::attribution::evidence::Candidate;
 use crate::attribution::moment::lasts;
+use crate::attribution::places::of_this_rig;
 use crate::attribution::rivals::{RIVAL, probabilities};
 use crate::channel::{Context, Target};
 use crate::effects::NEEDED_EVIDENCE;
@@ -55,11 +56,12 @@ pub(crate) fn choose(
         }
         let (probability, rivals) = probabilities(winner, &ranked[k + 1..], best.evidence);
         let unclear = rivals.first().is_some_and(|r| r.1 >= RIVAL * probability);
-        let named = best.fit.placed.iter().filter(|p| !p.is_tare()).count();
+        let named = of_this_rig(context, &best.fit.placed);
         let small = largest_reduction(context, winner, &around.with, &around.without) < CLEAR_REDUCTION;
         // what an earlier effect's rough form leaves of itself looks like a further small one
         let newest = winner.fit.placed.len() - 1;
-        let beside = connected(&winner.fit.placed, newest).iter().any(|k| *k != newest && !winner.fit.placed[*k].is_tare());
+        let placed = &winner.fit.placed;
+        let beside = connected(placed, newest).iter().any(|k| *k != newest && of_this_rig(context, &placed[*k..=*k]) > 0);
         if small && (beside || unclear && named > 0 || named >= EASILY_NAMED) {
             continue;
         }

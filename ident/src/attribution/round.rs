@@ -127,8 +127,10 @@ pub(crate) fn round_of(
     let stands = |placed: &[Placed]| {
         fit(context, declared, placed, Some(&best.fit), Rows::All).filter(|f| plausible(context, declared, f))
     };
-    let wide =
-        |placed: &[Placed]| refine_newest(context, declared, &between_starts(context, declared, placed, sketch), sketch, 120);
+    let wide = |placed: &[Placed]| {
+        let found = refine_newest(context, declared, &between_starts(context, declared, placed, sketch), sketch, 120);
+        better_on_all_rows(context, [stands(&found), stands(&newest_alone(placed, &found))], &best.fit)
+    };
     // the best on their grids, and of each of the best effects its best form: forms of one effect must not crowd out the others
     let mut heard = BTreeSet::new();
     let is_sure = |(k, (_, placed)): (usize, &(f64, Vec<Placed>))| {
@@ -138,7 +140,7 @@ pub(crate) fn round_of(
     };
     let sure: Vec<bool> = ranked.iter().enumerate().map(is_sure).collect();
     let queue: Vec<&Vec<Placed>> = ranked.iter().zip(&sure).filter(|(_, sure)| **sure).map(|(r, _)| &r.1).collect();
-    let mut found = in_parallel(queue.len(), &|k| stands(&wide(queue[k]))).into_iter();
+    let mut found = in_parallel(queue.len(), &|k| wide(queue[k])).into_iter();
     let mut most = f64::NEG_INFINITY;
     for (k, ((gain, placed), sure)) in ranked.iter().zip(sure).enumerate() {
         progress(0.7 + 0.3 * (k as f64 / count));
@@ -146,7 +148,7 @@ pub(crate) fn round_of(
         let promising = k < 3 * refined && *gain > 0.0 && *gain > 2.0 * most;
         let fitted = match sure {
             true => found.next().flatten(),
-            false if promising => stands(&wide(placed)),
+            false if promising => wide(placed),
             false => stands(placed),
         };
         if let Some(fitted) = fitted {
@@ -164,6 +166,19 @@ pub(crate) fn round_of(
     weigh(context, best, &mut out);
     on_fewer_channels(&mut out);
     out
+}
+
+/// The hypothesis with its newest effect as it was `found`, and the others as they stood.
+fn newest_alone(placed: &[Placed], found: &[Placed]) -> Vec<Placed> {
+    placed.split_last().into_iter().flat_map(|(_, others)| others).chain(found.last()).cloned().collect()
+}
+
+/// The one that brings more. Rows at even intervals may miss each row behind a step: what they say of a lag that stands already counts only where
+/// all rows agree.
+fn better_on_all_rows(context: &Context, found: [Option<Fit>; 2], best: &Fit) -> Option<Fit> {
+    let whole = vec![1.0; context.targets.len()];
+    let gain = |f: &Fit| net_gain(context, f, best, &whole);
+    found.into_iter().flatten().max_by(|a, b| gain(a).total_cmp(&gain(b)))
 }
 
 /// The effect that a candidate adds.

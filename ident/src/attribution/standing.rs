@@ -110,7 +110,7 @@ impl Standing {
     fn without_each(&self, ground: Ground<'_>, before: &[Held]) -> Vec<Vec<Held>> {
         let Ground { context, declared, start, folds } = ground;
         let errors = |k: usize| match without(context, declared, &self.best.fit, k, start) {
-            Some(fit) => heldout::errors(context, declared, &fit, folds),
+            Some(fit) => heldout::errors_without(context, declared, (&self.best.fit, k), &fit, folds),
             None => before.to_vec(),
         };
         (0..self.best.fit.placed.len()).map(errors).collect()

@@ -54,6 +54,8 @@ pub(crate) struct Facts {
     pub(crate) rail: OnceLock<Option<Rail>>,
     /// Period, its standard error and an instant of each target's updates, s, where it repeats its values and does not change with each.
     pub(crate) clocks: OnceLock<Vec<Option<[f64; 3]>>>,
+    /// The same of updates that noise hides, told by how late jumps of the load show.
+    pub(crate) late_clocks: OnceLock<Vec<Option<[f64; 3]>>>,
     /// Step and offset of the grid that each target's readings gather about, beneath noise.
     pub(crate) grids: OnceLock<Vec<Option<[f64; 2]>>>,
     /// See [`Context::step`].

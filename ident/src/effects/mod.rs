@@ -105,6 +105,12 @@ impl Shape {
         self.range.1 > 0.0 && self.range.0 == -self.range.1
     }
 
+    /// Whether it is an instant of the run, by the names that all effects give one.
+    #[must_use]
+    pub fn is_instant(&self) -> bool {
+        ["t0", "t1", "peak_time"].contains(&self.name)
+    }
+
     /// Whether it only places something within a row: it may lie on a bound without making the effect implausible.
     #[must_use]
     pub fn is_nuisance(&self) -> bool {

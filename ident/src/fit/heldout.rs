@@ -87,6 +87,39 @@ pub fn errors(context: &Context, declared: Declared<'_>, fit: &Fit, folds: &[Vec
         .collect()
 }
 
+/// Held-out error of each target by the fit without the effect at a position of a whole one. What a fold does not know of the others, an instant in it or
+/// an end of the range that it alone shows, it guesses as it does in the whole: a guess that differs must not decide about that effect.
+#[must_use]
+pub(crate) fn errors_without(
+    context: &Context,
+    declared: Declared<'_>,
+    (whole, position): (&Fit, usize),
+    without: &Fit,
+    folds: &[Vec<bool>],
+) -> Vec<Held> {
+    let others = |placed: &[Placed]| {
+        let kept = placed.iter().enumerate().filter(|(k, _)| *k != position);
+        kept.map(|(_, p)| p.shape.clone()).collect::<Vec<_>>()
+    };
+    let known = others(&whole.placed);
+    let all: Vec<usize> = (0..without.placed.len()).collect();
+    let guess = |keep: &[bool]| {
+        let guessed = others(&refine(context, declared, &whole.placed, Rows::Where(keep), EVALUATIONS));
+        let mut start = without.placed.clone();
+        for (p, (guessed, known)) in start.iter_mut().zip(guessed.iter().zip(&known)) {
+            let shapes = p.effect.shapes(context, &p.instance);
+            for ((v, shape), (guessed, known)) in p.shape.iter_mut().zip(shapes).zip(guessed.iter().zip(known)) {
+                *v = (*v + guessed - known).clamp(shape.range.0, shape.range.1);
+            }
+        }
+        let found = refine(context, declared, &start, Rows::Where(keep), EVALUATIONS);
+        unfelt_stay(context, declared, &start, (found, &all), keep)
+    };
+    let wanted = vec![true; context.targets.len()];
+    let pooled = pooled(context, declared, folds, &wanted, without, &guess);
+    pooled.into_iter().map(|e| e.unwrap_or(Held::UNKNOWN)).collect()
+}
+
 /// What the newest effect does to the held-out errors, by target.
 #[derive(Debug, Clone)]
 pub struct Around {
@@ -127,7 +160,7 @@ pub fn errors_around_newest(
     for out in folds {
         let keep: Vec<bool> = out.iter().map(|o| !o).collect();
         let placed = refine_group(context, declared, &fit.placed, &[others.len()], Rows::Where(&keep), EVALUATIONS);
-        let placed = unfelt_stay(context, declared, &fit.placed, placed, &keep);
+        let placed = unfelt_stay(context, declared, &fit.placed, (placed, &[others.len()]), &keep);
         let (mut with, mut without) = (Designs::new(context, declared, &placed), Designs::new(context, declared, others));
         let targets = context.targets.iter().zip(&mut sums).enumerate();
         for (k, (target, sums)) in targets.filter(|(_, (t, _))| newest.instance.touches(t.name)) {
@@ -195,7 +228,10 @@ pub(crate) fn left_out(
 ) -> Vec<Sum> {
     let mut sums = vec![Sum::default(); context.targets.len()];
     let keep: Vec<bool> = out.iter().map(|o| !o).collect();
-    let taught = |p: Placed| Placed { shape: p.effect.taught(context, &p.instance, &p.shape, &keep), ..p };
+    let taught = |p: Placed| {
+        let known = Placed { shape: p.effect.taught(context, &p.instance, &p.shape, &keep), ..p };
+        in_the_middle(context, known, &keep)
+    };
     let placed: Vec<Placed> = refined(&keep).into_iter().map(taught).collect();
     let mut designs = Designs::new(context, declared, &placed);
     for (k, (target, sum)) in context.targets.iter().zip(&mut sums).enumerate().filter(|(k, _)| wanted[*k]) {
@@ -206,6 +242,22 @@ pub(crate) fn left_out(
         }
     }
     sums
+}
+
+/// An effect whose instants within rows that are left out are in the middle of these: the kept rows do not tell them, and the middle is the guess that is
+/// wrong by least.
+fn in_the_middle(context: &Context, mut placed: Placed, keep: &[bool]) -> Placed {
+    let shapes = placed.effect.shapes(context, &placed.instance);
+    for (v, _) in placed.shape.iter_mut().zip(shapes).filter(|(_, s)| s.is_instant()) {
+        let row = context.t.partition_point(|t| t < v).min(keep.len().saturating_sub(1));
+        if keep.get(row).copied().unwrap_or(true) {
+            continue;
+        }
+        let from = keep[..row].iter().rposition(|k| *k).map_or(0, |k| k + 1);
+        let to = keep[row..].iter().position(|k| *k).map_or(keep.len(), |k| row + k) - 1;
+        *v = 0.5 * (context.t[from] + context.t[to]);
+    }
+    placed
 }
 
 /// Sums over rows that were left out.

@@ -159,6 +159,10 @@ pub(crate) fn connected(placed: &[Placed], k: usize) -> Vec<usize> {
     group
 }
 
+/// First steps from the optimum of all rows to that of a part of them, as a share of those from a grid's point: what a fold leaves out moves it by a
+/// fraction of its standard error. Larger ones cost a search of few evaluations all of them, and it ends far along any ridge.
+const NEAR: f64 = 0.1;
+
 /// Improves the shapes of the effects at the positions of `group` together, the others as they are.
 pub(crate) fn refine_group(
     context: &Context,
@@ -197,7 +201,8 @@ pub(crate) fn refine_group(
         };
         let x0: Vec<f64> = free.iter().map(|i| start[*i]).collect();
         let widths = free.iter().map(|i| (start[*i].abs(), ranges[*i].1 - ranges[*i].0));
-        let steps: Vec<f64> = widths.map(|(at, width)| (0.15 * at).max(0.01 * width).min(0.2 * width)).collect();
+        let near = if matches!(rows, Rows::Where(_)) { NEAR } else { 1.0 };
+        let steps: Vec<f64> = widths.map(|(at, width)| near * (0.15 * at).max(0.01 * width).min(0.2 * width)).collect();
         let best = with_shapes(placed, &inside(&nelder_mead(&cost, &x0, &steps, evaluations)));
         group.iter().map(|k| best[*k].shape.clone()).collect()
     });
@@ -209,26 +214,28 @@ pub(crate) fn refine_group(
 /// Share of a likelihood by which the order of its sums alone may move it: a million sums, each rounded to the 16th digit.
 const ROUNDED: f64 = 1e-10;
 
-/// The hypothesis with those shapes of its newest effect as they were in `from` that the kept rows do not feel: an instant within a stretch that is
-/// left out costs the rest nothing, wherever a simplex has carried it.
+/// The hypothesis with those shapes of the effects at some positions as they were in `from` that the kept rows do not feel: an instant within a
+/// stretch that is left out costs the rest nothing, wherever a simplex has carried it.
 #[must_use]
 pub(crate) fn unfelt_stay(
     context: &Context,
     declared: Declared<'_>,
     from: &[Placed],
-    mut refined: Vec<Placed>,
+    (mut refined, of): (Vec<Placed>, &[usize]),
     keep: &[bool],
 ) -> Vec<Placed> {
-    let Some(k) = refined.len().checked_sub(1) else { return refined };
-    let moving = touched_by_shapes(from, &[k]);
+    let moving = touched_by_shapes(from, of);
     let scattering = refined.iter().any(|p| p.effect.scatters());
     let taught = Taught::new(context, declared, Rows::Where(keep));
-    let gain = |placed: &[Placed]| taught.loglik(placed, &moving, scattering) + placed[k].prior(context);
+    let known = |placed: &[Placed]| of.iter().map(|k| placed[*k].prior(context)).sum::<f64>();
+    let gain = |placed: &[Placed]| taught.loglik(placed, &moving, scattering) + known(placed);
     let most = gain(&refined);
-    for i in 0..refined[k].shape.len() {
-        let found = std::mem::replace(&mut refined[k].shape[i], from[k].shape[i]);
-        if found != from[k].shape[i] && (gain(&refined) - most).abs() > ROUNDED * most.abs() {
-            refined[k].shape[i] = found;
+    for k in of {
+        for i in 0..refined[*k].shape.len() {
+            let found = std::mem::replace(&mut refined[*k].shape[i], from[*k].shape[i]);
+            if found != from[*k].shape[i] && (gain(&refined) - most).abs() > ROUNDED * most.abs() {
+                refined[*k].shape[i] = found;
+            }
         }
     }
     refined
@@ -280,7 +287,7 @@ mod tests {
             vec![Placed { effect, instance: Instance::new(&["thrust_n"], ""), shape: vec![t0] }]
         };
         let keep: Vec<bool> = t.iter().map(|t| !(40.0..60.0).contains(t)).collect();
-        let stays = |found: f64| unfelt_stay(&context, Declared::default(), &at(50.0), at(found), &keep)[0].shape[0];
+        let stays = |found: f64| unfelt_stay(&context, Declared::default(), &at(50.0), (at(found), &[0]), &keep)[0].shape[0];
         assert_eq!([42.0, 58.0].map(stays), [50.0, 50.0]);
         // one that they feel stays where it was found
         assert_eq!([20.0, 80.0].map(stays), [20.0, 80.0]);

@@ -62,7 +62,7 @@ impl Effect for SampleHold {
         let of_form =
             |t: &Target, form| Instance::new(&std::iter::once(t.name).chain(difference(t.name)).collect::<Vec<_>>(), form);
         let seen = |t: &Target| {
-            let beneath = || context.against_model && beneath_noise::clock(context, t).is_some();
+            let beneath = || beneath_noise::clock(context, t).is_some();
             let forms: [(&str, &dyn Fn() -> bool); 3] = [
                 ("", &|| period(context, t).is_some()),
                 (SKIPPING, &|| Clock::of_updates(context, t).is_some()),
@@ -85,27 +85,18 @@ impl Effect for SampleHold {
 
     fn apply(&self, context: &Context, instance: &Instance, _: &[f64], _: usize, design: &mut TargetDesign) {
         let Some(target) = target(context, instance) else { return };
-        let mut fresh = vec![false; context.len()];
         let clock = match instance.form.as_str() {
             BENEATH => beneath_noise::clock(context, target),
             SKIPPING => Clock::of_updates(context, target),
             _ => None,
         };
+        let mut fresh = vec![None; context.len()];
         match clock {
-            Some(clock) => clock.mark(&context.t, &mut fresh),
-            None if instance.form.is_empty() => updates(target).into_iter().for_each(|i| fresh[i] = true),
+            Some(clock) => fresh = clock.before(&context.t),
+            None if instance.form.is_empty() => updates(target).into_iter().for_each(|i| fresh[i] = Some(0.0)),
             None => return,
         }
-        let held = |column: &&[f64]| -> Vec<f64> {
-            let mut value = column.first().copied().unwrap_or(0.0);
-            let hold = |(v, fresh): (&f64, &bool)| {
-                if *fresh {
-                    value = *v;
-                }
-                value
-            };
-            column.iter().zip(&fresh).map(hold).collect()
-        };
+        let held = |column: &&[f64]| held(column, &fresh);
         through_meter(context, design, |columns| columns.iter().map(held).collect());
     }
 
@@ -117,6 +108,20 @@ impl Effect for SampleHold {
         }
         fitted
     }
+}
+
+/// A column between its updates, of each of which is known how long before its row it was, as a share of the interval that ends there.
+fn held(column: &[f64], fresh: &[Option<f64>]) -> Vec<f64> {
+    let mut last = column.first().copied().unwrap_or(0.0);
+    let mut value = last;
+    let hold = |(v, fresh): (&f64, &Option<f64>)| {
+        if let Some(share) = fresh {
+            value = v + share * (last - v);
+        }
+        last = *v;
+        value
+    };
+    column.iter().zip(fresh).map(hold).collect()
 }
 
 /// Form of a coarse display: not every update changes the reading.

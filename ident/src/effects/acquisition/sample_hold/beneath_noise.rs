@@ -24,6 +24,12 @@ const LATE: (f64, f64) = (0.25, 0.12);
 
 /// The clock of a channel's updates, where its changes have one.
 pub(super) fn clock(context: &Context, target: &Target) -> Option<Clock> {
+    let of_all = || context.targets.iter().map(|t| of_changes(context, t).map(Clock::parts)).collect();
+    let place = context.targets.iter().position(|t| t.name == target.name)?;
+    context.facts.late_clocks.get_or_init(of_all).get(place).copied().flatten().map(Clock::of_parts)
+}
+
+fn of_changes(context: &Context, target: &Target) -> Option<Clock> {
     let runs = changes(context, target);
     let long = runs.iter().filter(|run| run.1 > LONGEST_CHANGE).count();
     if long as f64 > CLOSE * runs.len() as f64 {

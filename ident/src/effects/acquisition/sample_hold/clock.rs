@@ -13,8 +13,6 @@ use crate::channel::{Context, STANDSTILL, Target};
 const FEWEST_CHANGES: usize = 8;
 /// Length of the changes' common phase, and evidence for it in nats beyond the number of rates that were tried.
 const ONE_PHASE: (f64, f64) = (0.8, 10.0);
-/// Part of the best length at which a slower rate is taken: a rate that fits fits with every multiple.
-const AS_GOOD: f64 = 0.95;
 /// Time from the first change within which the rate is first looked for, s.
 const LOOK: f64 = 300.0;
 /// The same in changes.
@@ -34,12 +32,14 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// Marks the first row at or after each update.
-    pub(super) fn mark(&self, t: &[f64], fresh: &mut [bool]) {
+    /// For the first row at or after each update how long before it the update was, as a share of the interval that ends there.
+    pub(super) fn before(&self, t: &[f64]) -> Vec<Option<f64>> {
         let count = |t: f64| ((t - self.first) / self.period).floor();
-        for (k, fresh) in fresh.iter_mut().enumerate() {
-            *fresh |= k == 0 || count(t[k]) > count(t[k - 1]);
-        }
+        let of_row = |w: &[f64]| {
+            let last = self.first + count(w[1]) * self.period;
+            (count(w[1]) > count(w[0])).then(|| (w[1] - last) / (w[1] - w[0]))
+        };
+        t.first().map(|_| Some(0.0)).into_iter().chain(t.windows(2).map(of_row)).collect()
     }
 
     /// Of changes on some rows, at least so many readings of `dt` seconds apart.
@@ -54,14 +54,17 @@ impl Clock {
         let known = &times[..times.partition_point(|t| *t - times[0] <= LOOK).min(LOOKED_AT)];
         let step = 0.2 / (known.last()? - known[0]).max(1.0);
         let (from, to) = (1.0 / (least + 2.0 * dt), 1.0 / (fewest_rows * dt));
-        let rates: Vec<(f64, f64)> =
-            (0..).map(|k| from + f64::from(k) * step).take_while(|f| *f < to).map(|f| (f, phase(known, f).1)).collect();
-        let (at, best) = rates.iter().fold((to, 0.0), |a: (f64, f64), r| if r.1 > a.1 { *r } else { a });
-        if best < ONE_PHASE.0 || of_one_phase(known.len(), best, at * dt) < (rates.len() as f64).ln() + ONE_PHASE.1 {
+        let rates: Vec<f64> = (0..).map(|k| from + f64::from(k) * step).take_while(|f| *f < to).collect();
+        // a rate that fits fits with every multiple, less closely for the length of a row, and with those that the schedule adds: its own is the one
+        // for which most speaks
+        let asked = rates.iter().map(|rate| {
+            let length = phase(known, *rate).1;
+            (*rate, length, of_one_phase(known.len(), length, rate * dt))
+        });
+        let (rate, length, speaks) = asked.max_by(|a, b| a.2.total_cmp(&b.2))?;
+        if length < ONE_PHASE.0 || speaks < (rates.len() as f64).ln() + ONE_PHASE.1 {
             return None;
         }
-        let first = rates.iter().position(|r| r.1 > AS_GOOD * best)?;
-        let rate = rates[first..].iter().take_while(|r| r.1 > AS_GOOD * best).max_by(|a, b| a.1.total_cmp(&b.1))?.0;
         let (period, error) = slope(context, rows, &|_| true, 1.0 / rate);
         let (turn, _) = phase(&times, 1.0 / period);
         Some(Self { period, error, first: turn * period - 0.5 * dt })
@@ -70,10 +73,19 @@ impl Clock {
     /// Of a channel that repeats its values and does not change with every update, as a coarse display does.
     pub(super) fn of_updates(context: &Context, target: &Target) -> Option<Self> {
         let of = |t: &Target| Self::of_changes(context, &changes(context, t), (FEWEST_ROWS, spacing(context, t)));
-        let of_all = || context.targets.iter().map(|t| of(t).map(|c| [c.period, c.error, c.first])).collect();
+        let of_all = || context.targets.iter().map(|t| of(t).map(Self::parts)).collect();
         let place = context.targets.iter().position(|t| t.name == target.name)?;
-        let [period, error, first] = context.facts.clocks.get_or_init(of_all).get(place).copied().flatten()?;
-        Some(Self { period, error, first })
+        context.facts.clocks.get_or_init(of_all).get(place).copied().flatten().map(Self::of_parts)
+    }
+
+    /// Period, its standard error and the instant of an update, s: as facts keep a clock.
+    pub(super) fn parts(self) -> [f64; 3] {
+        [self.period, self.error, self.first]
+    }
+
+    /// The clock of such parts.
+    pub(super) fn of_parts([period, error, first]: [f64; 3]) -> Self {
+        Self { period, error, first }
     }
 }
 
@@ -124,5 +136,20 @@ mod tests {
         let clock = of(&|t| 2.0 * wander(held(t))).expect("a clock");
         assert!((clock.period - 0.4087).abs() < 3.0 * clock.error + 1e-3, "{clock:?}");
         assert!(of(&|t| 2.0 * wander(t)).is_none());
+    }
+
+    /// A load that jumps every eight seconds, seen at the next update: the changes also have nearly one phase at a rate that is one less in eight seconds.
+    #[test]
+    fn an_even_schedule_does_not_pass_for_another_period() {
+        let t: Vec<f64> = (0..3200).map(|i| 0.1 * f64::from(i)).collect();
+        let column = |name: &str, value: f64| Column { name: name.to_owned(), values: vec![value; t.len()] };
+        let log = Log { t: t.clone(), columns: vec![column("rpm", 5000.0), column("thrust_n", 8.0)], ..Log::default() };
+        let context = Context::new(&log, None);
+        for period in [1.06, 1.22, 0.83] {
+            let seen = |k: i32| ((8.0 * f64::from(k) + 0.37) / period).ceil() * period - 0.37;
+            let rows: Vec<usize> = (1..39).map(|k| t.partition_point(|t| *t < seen(k))).collect();
+            let clock = Clock::of_changes(&context, &rows, (4.0, 0.1)).expect("a clock");
+            assert!((clock.period - period).abs() < 2.0 * clock.error, "{period}: {clock:?}");
+        }
     }
 }
