@@ -37,6 +37,9 @@ const AREAS: [(&str, &[&str]); 14] = [
         "Rig logs",
         &[
             "ident/src/log/mod.rs",
+            "ident/src/log/lines.rs",
+            "ident/src/log/header.rs",
+            "ident/src/log/row.rs",
             "ident/src/log/clock.rs",
             "ident/src/log/disc.rs",
             "ident/src/log/gaps.rs",

@@ -13,12 +13,15 @@ mod disc;
 pub mod flight_log;
 mod gaps;
 mod head;
+mod header;
 pub mod import;
 pub mod join;
+mod lines;
 pub(crate) mod plausible;
 pub(crate) use plausible::STANDSTILL;
 pub mod quantity;
 mod rig;
+mod row;
 pub mod sparse;
 mod whole;
 
@@ -26,21 +29,20 @@ pub use disc::Disc;
 pub use gaps::Gaps;
 pub(crate) use head::{check as check_head, event, odd as odd_in_head};
 pub use head::{event_line, meta_line};
+pub(crate) use header::named_shortly;
+pub(crate) use lines::{Lines, digest_of};
+pub use lines::{MAX_LINE, digest};
 pub use rig::{Named, OtherRig, named_alike};
+pub(crate) use row::FARTHEST;
 pub use whole::{folder_of, no_regular_file, place_of, what_lies_at, write_whole};
 
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 
 /// First line of the format.
 pub const FORMAT: &str = "quadrig-log 1";
-/// Longest line that a reader takes, bytes.
-pub const MAX_LINE: usize = 1 << 20;
-/// Longest name of a column, characters.
-const LONGEST_NAME: usize = 200;
 /// The measured channels that a verdict speaks of, in the order of the questions that are asked of them.
 pub const MODELLED: [&str; 9] =
     ["rpm_beam", "rpm_opto", "rpm_hall", "rpm_encoder", "rpm", "thrust_n", "torque_nm", "current_a", "voltage_v"];
@@ -125,10 +127,10 @@ impl Log {
     #[must_use]
     pub fn digest(&self) -> String {
         let of_text = || {
-            let mut text = Digesting(Sha256::new());
+            let mut text = lines::Digesting::new();
             // nothing that is kept in memory fails to take bytes
             let _ = self.write_to(&mut text);
-            hexadecimal(text.0)
+            text.finish()
         };
         self.sha256.clone().unwrap_or_else(of_text)
     }
@@ -186,7 +188,7 @@ impl Log {
     pub(crate) fn parse_as(format: &str, file: &str, source: impl BufRead) -> Result<Self, ReadError> {
         let mut lines = Lines::new(file, source);
         let mut log = Self { name: file.to_owned(), ..Self::default() };
-        let header = read_head(format, &mut lines, &mut log)?;
+        let header = header::read_head(format, &mut lines, &mut log)?;
         for name in header.iter().skip(1) {
             log.columns.push(Column { name: name.clone(), values: Vec::new() });
         }
@@ -202,12 +204,12 @@ impl Log {
             }
             let place = lines.place();
             // of a row that is cut short the time may be, too, and of one field too many the first half of it
-            let whole = header.len() == fields_of(&line);
+            let whole = header.len() == row::fields_of(&line);
             if let Some(t) = clock::first_field(&line).filter(|t| whole && log.t.last().is_some_and(|last| t < last)) {
                 return Err(clock::stepped_back(t, &log, &row_lines, &place, &mut lines)?);
             }
             row_lines.push(place.line);
-            read_row(&line, &header, &place, &mut log)?;
+            row::read_row(&line, &header, &place, &mut log)?;
         }
         if log.is_empty() {
             return Err(lines.place().refuse(None, "no data rows", "at least one line of numbers under the header"));
@@ -215,7 +217,7 @@ impl Log {
         if format == FORMAT {
             clock::check(&log, file, &row_lines)?;
         }
-        log.sha256 = Some(hexadecimal(lines.digest));
+        log.sha256 = Some(lines.finish());
         Ok(log)
     }
 
@@ -282,344 +284,6 @@ pub(crate) fn trimmed(value: f64, digits: usize) -> String {
     if s == "-0" { "0".to_owned() } else { s }
 }
 
-/// Bounded line reader that knows where it is.
-pub(crate) struct Lines<'a, R> {
-    file: &'a str,
-    source: R,
-    number: usize,
-    /// Of every byte that was read.
-    digest: Sha256,
-}
-
-/// A sink that keeps the digest of what is written to it.
-struct Digesting(Sha256);
-
-impl Write for Digesting {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.update(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
-}
-
-/// SHA-256 of bytes, as `sha256sum` prints it.
-#[must_use]
-pub fn digest(bytes: &[u8]) -> String {
-    hexadecimal(Sha256::new_with_prefix(bytes))
-}
-
-/// SHA-256 of a text, as `sha256sum` prints it.
-pub(crate) fn digest_of(text: &str) -> String {
-    hexadecimal(Sha256::new_with_prefix(text))
-}
-
-fn hexadecimal(digest: Sha256) -> String {
-    digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-impl<'a, R: BufRead> Lines<'a, R> {
-    pub(crate) fn new(file: &'a str, source: R) -> Self {
-        Self { file, source, number: 0, digest: Sha256::new() }
-    }
-
-    pub(crate) fn place(&self) -> Place<'a> {
-        Place { file: self.file, line: self.number.max(1) }
-    }
-
-    /// The next line in a string of its own; `None` at the end.
-    pub(crate) fn next_line(&mut self) -> Result<Option<String>, ReadError> {
-        let mut text = String::new();
-        Ok(self.read_into(&mut text)?.then_some(text))
-    }
-
-    /// The next line in place of what `text` held; false at the end.
-    fn read_into(&mut self, text: &mut String) -> Result<bool, ReadError> {
-        let mut bytes = std::mem::take(text).into_bytes();
-        bytes.clear();
-        let n = (&mut self.source)
-            .take(MAX_LINE as u64 + 1)
-            .read_until(b'\n', &mut bytes)
-            .map_err(|source| ReadError::Io { file: self.file.to_owned(), source })?;
-        if n == 0 {
-            return Ok(false);
-        }
-        self.digest.update(&bytes);
-        self.number += 1;
-        if self.number == 1 && bytes.trim_ascii_end().contains(&b'\r') {
-            let found = "lines that end with a carriage return alone";
-            return Err(self.place().refuse(None, found, "lines that end with a line feed: save the file so in an editor"));
-        }
-        if n > MAX_LINE {
-            return Err(self.place().refuse(
-                None,
-                format!("a line longer than {MAX_LINE} bytes"),
-                "a text file with one short line a sample",
-            ));
-        }
-        while matches!(bytes.last(), Some(b'\n' | b'\r')) {
-            bytes.pop();
-        }
-        if self.number == 1 && bytes.starts_with(&[0xEF, 0xBB, 0xBF]) {
-            bytes.drain(..3);
-        }
-        *text = String::from_utf8(bytes)
-            .map_err(|_| self.place().refuse(None, "bytes that are not UTF-8", "a CSV text file in UTF-8"))?;
-        Ok(true)
-    }
-}
-
-fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) -> Result<Vec<String>, ReadError> {
-    let mut format_seen = false;
-    loop {
-        let Some(line) = lines.next_line()? else {
-            return Err(lines.place().refuse(
-                None,
-                "the file is empty or ends before its header",
-                format!("'# {format}' and a header line that starts with t_s"),
-            ));
-        };
-        let place = lines.place();
-        if let Some(comment) = line.strip_prefix('#') {
-            let comment = comment.trim();
-            if !format_seen {
-                if comment != format {
-                    let found = format!("'{}'", short(&line));
-                    return Err(match comment {
-                        crate::log::flight_log::FORMAT => place.refuse(
-                            None,
-                            found,
-                            format!("'# {format}' on the first line (a flight: `quadrig close-loop` takes it)"),
-                        ),
-                        _ => place.refuse(
-                            None,
-                            found,
-                            format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
-                        ),
-                    });
-                }
-                format_seen = true;
-            } else if let Some(event) = event(comment) {
-                log.events.push(event);
-            } else if let Ok(table) = comment.parse::<toml::Table>() {
-                if let Some(key) = table.keys().find(|key| log.meta.contains_key(*key)) {
-                    return Err(place.refuse(
-                        Some(key),
-                        "it stands twice in the head",
-                        "each key once: which of the two is right?",
-                    ));
-                }
-                if format == FORMAT {
-                    head::check(&table, &place)?;
-                }
-                log.meta.extend(table);
-            } else if let Some((key, value)) = head::misread(comment) {
-                let expected = format!("a value in TOML, a text in quotes: {key} = \"{}\"", value.trim_matches(['"', '\'']));
-                return Err(place.refuse(Some(key), short(value), expected));
-            }
-            continue;
-        }
-        if line.trim().is_empty() {
-            continue;
-        }
-        if !format_seen {
-            return Err(place.refuse(
-                None,
-                "no format line",
-                format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
-            ));
-        }
-        return check_header(&line, &place);
-    }
-}
-
-fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError> {
-    let names: Vec<String> = line.split(',').map(|n| n.trim().to_owned()).collect();
-    if names.first().map(String::as_str) != Some("t_s") {
-        if let Some((_, word)) = [(';', "semicolons"), ('\t', "tabs")].iter().find(|(c, _)| names.len() == 1 && line.contains(*c))
-        {
-            let expected = "commas (and points in the numbers); save it so, or use `quadrig import`";
-            return Err(place.refuse(None, format!("{word} between the columns"), expected));
-        }
-        if names.len() > 1 && names.iter().all(|name| name.is_empty() || name.parse::<f64>().is_ok()) {
-            let expected = "a header line above them that names the columns, such as t_s,pulse_us,rpm,thrust_n: put it back";
-            return Err(place.refuse(None, "no header: the first line that is no comment holds numbers", expected));
-        }
-        return Err(place.refuse(names.first().map(String::as_str), "not the time column", "t_s (seconds) as the first column"));
-    }
-    for (i, name) in names.iter().enumerate() {
-        if name.is_empty() {
-            return Err(place.refuse(None, format!("column {} has no name", i + 1), "a name for every column"));
-        }
-        named_shortly(name, place)?;
-        if names[..i].contains(name) {
-            return Err(place.refuse(Some(name), "it stands twice", "each column once"));
-        }
-        if let Some(right) = other_letters(name) {
-            let expected = format!("{right}: rename the column, or give another quantity a name of its own");
-            return Err(place.refuse(Some(name), "a known column in other letters", expected));
-        }
-        if let Some(right) = wrong_unit(&name.to_lowercase()) {
-            return Err(place.refuse(
-                Some(name),
-                "a known quantity in another unit",
-                format!("{right}; convert the values and rename the column"),
-            ));
-        }
-    }
-    if names.len() < 3 {
-        return Err(place.refuse(None, format!("{} column(s)", names.len()), "t_s and at least two measured columns"));
-    }
-    Ok(names)
-}
-
-/// Refuses a name that no line of an output can hold.
-pub(crate) fn named_shortly(name: &str, place: &Place<'_>) -> Result<(), ReadError> {
-    let length = name.chars().count();
-    if length <= LONGEST_NAME {
-        return Ok(());
-    }
-    let expected = format!("a name of {LONGEST_NAME} at most: is this the header, or a row of another file?");
-    Err(place.refuse(Some(name), format!("a name of {length} characters"), expected))
-}
-
-/// The contract's name of a column that differs from it by small and capital letters alone.
-fn other_letters(name: &str) -> Option<&'static str> {
-    let mut known = MODELLED.into_iter().chain(["pulse_us", "temp_c", "t_s"]);
-    known.find(|known| *known != name && known.eq_ignore_ascii_case(name))
-}
-
-/// The contract's name for a column that carries a known quantity in a unit that the contract does not use.
-fn wrong_unit(name: &str) -> Option<&'static str> {
-    const KNOWN: [(&str, &str, &[&str]); 7] = [
-        ("thrust_", "thrust_n", &["g", "gf", "kg", "kgf", "lbf", "lb", "mn", "oz"]),
-        ("torque_", "torque_nm", &["n_m", "ncm", "mnm", "nmm", "lbfin", "gcm"]),
-        ("current_", "current_a", &["ma", "ka"]),
-        ("voltage_", "voltage_v", &["mv", "kv"]),
-        ("temp_", "temp_c", &["k", "f"]),
-        ("pulse_", "pulse_us", &["ms", "ns", "s", "percent", "pct", "duty"]),
-        ("t_", "t_s", &["ms", "us", "ns", "min"]),
-    ];
-    KNOWN.iter().find_map(|(stem, right, wrong)| wrong.contains(&name.strip_prefix(stem)?).then_some(*right))
-}
-
-/// Largest reading of a modelled channel: a hundred times the electrical turns of the fastest rotor.
-const READ: f64 = 1e7;
-/// Largest number of any column: sums of a million of its squares still have an end.
-pub(crate) const FARTHEST: f64 = 1e30;
-
-/// Number of fields of a row.
-fn fields_of(line: &str) -> usize {
-    1 + line.bytes().filter(|b| *b == b',').count()
-}
-
-/// The column of a row with one field too many whose number a decimal comma has cut in two, and both parts: of those that it could be the one
-/// whose row is most like the row before.
-fn cut_by_its_comma<'a>(line: &'a str, header: &'a [String], log: &Log) -> Option<(&'a str, &'a str, &'a str)> {
-    let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    // how far a row is from the one before, each column by its own size
-    let distance = |cut: usize| -> Option<f64> {
-        let (whole, part) = (fields.get(cut)?, fields.get(cut + 1)?);
-        if !digits(whole.strip_prefix('-').unwrap_or(whole)) || !digits(part) {
-            return None;
-        }
-        let joined = format!("{whole}.{part}");
-        let row = fields.iter().take(cut).copied().chain([joined.as_str()]).chain(fields.iter().skip(cut + 2).copied());
-        let before = std::iter::once(&log.t).chain(log.columns.iter().map(|c| &c.values)).map(|values| values.last().copied());
-        let mut sum = 0.0;
-        for (text, before) in row.zip(before) {
-            let value = if text.is_empty() { continue } else { text.parse::<f64>().ok()? };
-            let size = before.map_or(0.0, |before| value.abs().max(before.abs()));
-            sum += before.filter(|_| size > 0.0).map_or(0.0, |before| (value - before).abs() / size);
-        }
-        Some(sum)
-    };
-    let cuts = (0..header.len()).filter(|_| fields.len() == header.len() + 1);
-    let (cut, _) = cuts.filter_map(|cut| Some((cut, distance(cut)?))).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some((header.get(cut)?.as_str(), fields.get(cut)?, fields.get(cut + 1)?))
-}
-
-fn read_row(line: &str, header: &[String], place: &Place<'_>, log: &mut Log) -> Result<(), ReadError> {
-    let fields = fields_of(line);
-    if let Some(missing) = header.get(fields) {
-        return Err(place.refuse(
-            Some(missing),
-            format!("the row ends before it ({fields} field{})", if fields == 1 { "" } else { "s" }),
-            format!("{} as in the header (is the file truncated?)", header.len()),
-        ));
-    }
-    if fields > header.len() {
-        if let Some((name, whole, part)) = cut_by_its_comma(line, header, log) {
-            let found = format!("'{},{}', and so {fields} fields", short(whole), short(part));
-            let expected = format!("{} as in the header: a decimal comma? Write {}.{}", header.len(), short(whole), short(part));
-            return Err(place.refuse(Some(name), found, expected));
-        }
-        let commas = fields + 1 >= 2 * header.len();
-        let reason = if commas { ": a decimal comma? Write decimal points" } else { "" };
-        return Err(place.refuse(None, format!("{fields} fields"), format!("{} as in the header{reason}", header.len())));
-    }
-    for ((i, text), name) in line.split(',').enumerate().zip(header) {
-        let text = text.trim();
-        let value = if text.is_empty() {
-            f64::NAN
-        } else {
-            match text.parse::<f64>() {
-                Ok(v) if v.is_finite() && (v.abs() > FARTHEST || (v.abs() > READ && MODELLED.contains(&name.as_str()))) => {
-                    let expected = "a number that a sensor can read (1e7 at most), or an empty field for a missing sample";
-                    return Err(place.refuse(Some(name), format!("'{}'", short(text)), expected));
-                }
-                Ok(v) if v.is_finite() => v,
-                Ok(_) => {
-                    return Err(place.refuse(
-                        Some(name),
-                        format!("'{}'", short(text)),
-                        "a finite number, or an empty field for a missing sample",
-                    ));
-                }
-                Err(_) => {
-                    return Err(place.refuse(
-                        Some(name),
-                        format!("'{}'", short(text)),
-                        "a decimal number, or an empty field for a missing sample",
-                    ));
-                }
-            }
-        };
-        if i == 0 {
-            check_time(value, log, place)?;
-            log.t.push(value);
-        } else {
-            check_range(name, value, place)?;
-            log.columns[i - 1].values.push(value);
-        }
-    }
-    Ok(())
-}
-
-fn check_time(value: f64, log: &Log, place: &Place<'_>) -> Result<(), ReadError> {
-    if value.is_nan() {
-        return Err(place.refuse(Some("t_s"), "an empty field", "a time stamp on every row"));
-    }
-    match log.t.last() {
-        Some(last) if value == *last => Err(place.refuse(
-            Some("t_s"),
-            format!("{value} repeats the row before"),
-            "strictly increasing time (`quadrig import` repairs it by a stated rule)",
-        )),
-        _ => Ok(()),
-    }
-}
-
-fn check_range(name: &str, value: f64, place: &Place<'_>) -> Result<(), ReadError> {
-    if (name == "pulse_us" || name.starts_with("pulse_us_")) && value.is_finite() && !(500.0..=2500.0).contains(&value) {
-        return Err(place.refuse(Some(name), format!("{value}"), "500 to 2500 us (duty in percent is pulse_us / 200)"));
-    }
-    Ok(())
-}
-
 /// A text as a refusal repeats it: 40 characters, and three dots in the place of more.
 #[must_use]
 pub fn short(text: &str) -> String {
@@ -629,6 +293,7 @@ pub fn short(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Read;
 
     fn parse(text: &str) -> Result<Log, String> {
         Log::parse("run.csv", text.as_bytes()).map_err(|e| e.to_string())
