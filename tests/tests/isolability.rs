@@ -62,7 +62,7 @@ fn a_cause_is_named_above_its_size_and_not_far_below() {
     for (name, id, table) in TRIED {
         let (at, held) = size(&found, name);
         account += &format!("{name} from {at:.3e}:");
-        for seed in cases(&[71][..], &[71, 72]).iter().copied() {
+        for seed in [71, 72] {
             let named = |times: f64| {
                 let table = table.replace("SIZE", &format!("{:e}", times * at)).replace("HELD", &format!("{held}"));
                 verdict(&flown(folder.path(), seed, UP_DOWN, &format!("[[effect]]\nid = \"{id}\"\n{table}\n"))).0

@@ -206,3 +206,41 @@ fn on_fewer_channels(candidates: &mut [Candidate]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::by_id;
+    use crate::log::{Column, Log};
+
+    fn placed(id: &str, channels: &[&str], shape: &[f64]) -> Placed {
+        Placed { effect: by_id(id).expect("in the library"), instance: Instance::new(channels, ""), shape: shape.to_vec() }
+    }
+
+    /// A zero that slipped at 10 s, its instant as two refinements left it, and a gain whose start each of them moved or left alone.
+    #[test]
+    fn what_a_sketch_says_of_others_counts_where_all_rows_agree() {
+        let t: Vec<f64> = (0..400).map(|i| 0.05 * f64::from(i)).collect();
+        let rpm: Vec<f64> = (0..400).map(|i| 2000.0 + 1000.0 * f64::from(i / 50 % 4)).collect();
+        let noise = |i: usize| 0.01 * (1.3 * (i * i) as f64).sin();
+        let thrust = |i: usize| 1e-7 * rpm[i].powi(2) * if t[i] < 5.0 { 1.0 } else { 1.1 } + if t[i] < 10.0 { 0.0 } else { 0.2 };
+        let thrust: Vec<f64> = (0..400).map(|i| thrust(i) + noise(i)).collect();
+        let columns = [("rpm", rpm.clone()), ("thrust_n", thrust)];
+        let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
+        let context = Context::new(&Log { t: t.clone(), columns, ..Log::default() }, None);
+        let gain = |t0: f64| {
+            let instance = Instance::new(&["thrust_n"], "step");
+            Placed { effect: by_id("gain_change").expect("in the library"), instance, shape: vec![0.1, t0] }
+        };
+        let slipped = |t0: f64| placed("tare_shift", &["thrust_n"], &[t0]);
+        let begun = [gain(5.2), slipped(9.0)];
+        let fitted = |placed: &[Placed]| fit(&context, Declared::default(), placed, None, Rows::All);
+        let best = fitted(&begun[..1]).expect("a fit");
+        let kept = |found: &[Placed]| {
+            let chosen = better_on_all_rows(&context, [fitted(found), fitted(&newest_alone(&begun, found))], &best);
+            chosen.expect("one of them").placed.iter().map(|p| *p.shape.last().expect("an instant")).collect::<Vec<_>>()
+        };
+        assert_eq!(kept(&[gain(12.0), slipped(10.0)]), [5.2, 10.0]);
+        assert_eq!(kept(&[gain(5.0), slipped(10.0)]), [5.0, 10.0]);
+    }
+}
