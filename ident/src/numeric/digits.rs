@@ -16,9 +16,10 @@ const OF_ERROR: usize = 3;
 /// Significant digits of what has no standard error.
 const PLAIN: usize = 9;
 
-/// A value to the digits that its standard error supports.
+/// A value to the digits that its standard error supports. An error larger than the value says that it is known together with others alone, such as the
+/// voltage that a power is told at beside the power's size: it counts as one as large as the value.
 pub(crate) fn of_value(value: f64, se: f64) -> f64 {
-    let se = of_error(se);
+    let se = of_error(if se > value.abs() { value.abs() } else { se });
     if !(se > 0.0 && se.is_finite() && value.is_finite()) {
         return plain(value);
     }
@@ -83,7 +84,9 @@ mod tests {
             (2.0 / 3.0, f64::NAN, 0.666_666_667),
             (2.0 / 3.0, 0.0, 0.666_666_667),
             (1.234_567_890_12e9, 4.0e7, 1.234_567_89e9),
-            (1e-9, 1.0, 0.0),
+            (1e-9, 1.0, 1e-9),
+            // a reference that a size beside it makes up for: a tenth of a volt off is a hundredth of the current
+            (15.849_912_3, 610_000.0, 15.849_9),
         ] {
             assert_eq!(of_value(value, se), written, "{value} +- {se}");
         }
