@@ -38,7 +38,7 @@ const AREAS: [(&str, &[&str]); 14] = [
         &[
             "ident/src/log/mod.rs",
             "ident/src/log/lines.rs",
-            "ident/src/log/header.rs",
+            "ident/src/log/names.rs",
             "ident/src/log/row.rs",
             "ident/src/log/clock.rs",
             "ident/src/log/disc.rs",

@@ -225,9 +225,9 @@ mod tests {
         let noise = |i: usize| 0.01 * (1.3 * (i * i) as f64).sin();
         let thrust = |i: usize| 1e-7 * rpm[i].powi(2) * if t[i] < 5.0 { 1.0 } else { 1.1 } + if t[i] < 10.0 { 0.0 } else { 0.2 };
         let thrust: Vec<f64> = (0..400).map(|i| thrust(i) + noise(i)).collect();
-        let columns = [("rpm", rpm.clone()), ("thrust_n", thrust)];
+        let columns = [("rpm", rpm), ("thrust_n", thrust)];
         let columns = columns.into_iter().map(|(name, values)| Column { name: name.to_owned(), values }).collect();
-        let context = Context::new(&Log { t: t.clone(), columns, ..Log::default() }, None);
+        let context = Context::new(&Log { t, columns, ..Log::default() }, None);
         let gain = |t0: f64| {
             let instance = Instance::new(&["thrust_n"], "step");
             Placed { effect: by_id("gain_change").expect("in the library"), instance, shape: vec![0.1, t0] }

@@ -1,11 +1,14 @@
-//! The head of a log: a comment line for each key and each event.
+//! The head of a log: its format, a comment line for each key and each event, and the header.
 //!
 //! What it is: values as TOML, each on one line.
 //! What can go wrong: a text may hold a line's end, however deep in a table it lies; it is escaped. A value that no rig can have is refused at its line.
 //! Units: as the keys state.
 //! Reference: specification `formats.md`, "Rig log"; TOML 1.0.
 
-use super::{Place, ReadError, short};
+use super::lines::Lines;
+use super::names::check_header;
+use super::{FORMAT, Log, Place, ReadError, flight_log, short};
+use std::io::BufRead;
 use std::path::Path;
 use toml::Value;
 
@@ -48,6 +51,71 @@ pub(crate) fn odd(table: &toml::Table) -> Option<(&'static str, &Value, &'static
 
 /// The texts of a rig's head that name it and its run.
 const TEXTS: [&str; 4] = ["motor", "propeller", "supply", "date"];
+
+/// Reads a log's first line, what travels with it, and the names of its columns.
+pub(super) fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) -> Result<Vec<String>, ReadError> {
+    let mut format_seen = false;
+    loop {
+        let Some(line) = lines.next_line()? else {
+            return Err(lines.place().refuse(
+                None,
+                "the file is empty or ends before its header",
+                format!("'# {format}' and a header line that starts with t_s"),
+            ));
+        };
+        let place = lines.place();
+        if let Some(comment) = line.strip_prefix('#') {
+            let comment = comment.trim();
+            if !format_seen {
+                if comment != format {
+                    let found = format!("'{}'", short(&line));
+                    return Err(match comment {
+                        flight_log::FORMAT => place.refuse(
+                            None,
+                            found,
+                            format!("'# {format}' on the first line (a flight: `quadrig close-loop` takes it)"),
+                        ),
+                        _ => place.refuse(
+                            None,
+                            found,
+                            format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
+                        ),
+                    });
+                }
+                format_seen = true;
+            } else if let Some(event) = event(comment) {
+                log.events.push(event);
+            } else if let Ok(table) = comment.parse::<toml::Table>() {
+                if let Some(key) = table.keys().find(|key| log.meta.contains_key(*key)) {
+                    return Err(place.refuse(
+                        Some(key),
+                        "it stands twice in the head",
+                        "each key once: which of the two is right?",
+                    ));
+                }
+                if format == FORMAT {
+                    check(&table, &place)?;
+                }
+                log.meta.extend(table);
+            } else if let Some((key, value)) = misread(comment) {
+                let expected = format!("a value in TOML, a text in quotes: {key} = \"{}\"", value.trim_matches(['"', '\'']));
+                return Err(place.refuse(Some(key), short(value), expected));
+            }
+            continue;
+        }
+        if line.trim().is_empty() {
+            continue;
+        }
+        if !format_seen {
+            return Err(place.refuse(
+                None,
+                "no format line",
+                format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
+            ));
+        }
+        return check_header(&line, &place);
+    }
+}
 
 /// Key and value of a comment that is no TOML although it names the rig.
 pub(super) fn misread(comment: &str) -> Option<(&str, &str)> {

@@ -13,10 +13,10 @@ mod disc;
 pub mod flight_log;
 mod gaps;
 mod head;
-mod header;
 pub mod import;
 pub mod join;
 mod lines;
+mod names;
 pub(crate) mod plausible;
 pub(crate) use plausible::STANDSTILL;
 pub mod quantity;
@@ -29,9 +29,9 @@ pub use disc::Disc;
 pub use gaps::Gaps;
 pub(crate) use head::{check as check_head, event, odd as odd_in_head};
 pub use head::{event_line, meta_line};
-pub(crate) use header::named_shortly;
 pub(crate) use lines::{Lines, digest_of};
 pub use lines::{MAX_LINE, digest};
+pub(crate) use names::named_shortly;
 pub use rig::{Named, OtherRig, named_alike};
 pub(crate) use row::FARTHEST;
 pub use whole::{folder_of, no_regular_file, place_of, what_lies_at, write_whole};
@@ -188,7 +188,7 @@ impl Log {
     pub(crate) fn parse_as(format: &str, file: &str, source: impl BufRead) -> Result<Self, ReadError> {
         let mut lines = Lines::new(file, source);
         let mut log = Self { name: file.to_owned(), ..Self::default() };
-        let header = header::read_head(format, &mut lines, &mut log)?;
+        let header = head::read_head(format, &mut lines, &mut log)?;
         for name in header.iter().skip(1) {
             log.columns.push(Column { name: name.clone(), values: Vec::new() });
         }

@@ -3,7 +3,7 @@
 //! What it is: as many numbers as the header has names; an empty field is a missing sample.
 //! What can go wrong: a decimal comma makes one field too many: the refusal names the column that it most likely cut.
 //! Units: as the names of the columns say.
-//! Reference: specification `formats.md`, log.
+//! Reference: specification `formats.md`, "Rig log".
 
 use crate::log::{Log, MODELLED, Place, ReadError, short};
 

@@ -2,7 +2,8 @@
 //!
 //! What it is: a value to the second digit of its standard error and `GUARD` more, the error itself to three, and what has no error to
 //! `PLAIN` significant ones. What is written once is read and written again to the same digits.
-//! What can go wrong: an error of zero or one that is not known supports no digit less than all that are kept.
+//! What can go wrong: an error of zero or one that is not known supports no digit less than all that are kept. One larger than its value would cut
+//! digits that predictions need.
 //! Units: those of the values.
 //! Reference: GUM, clause 7.2.6: two digits of an uncertainty, and further ones of values that are used together, against rounding.
 

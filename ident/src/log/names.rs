@@ -1,83 +1,17 @@
-//! From the first line of a log to the names of its columns.
+//! The names of a log's columns.
 //!
-//! What it is: the format line, comments with what travels with the run, and the header.
-//! What can go wrong: another format, a key twice, a name that the contract writes otherwise: each refusal says which line and what to do.
-//! Units: as the names of the columns say.
-//! Reference: specification `formats.md`, log.
+//! What it is: the header line, cut at its commas and checked name by name.
+//! What can go wrong: a name twice, none, one of another unit or in other letters: each refusal says which and what to do.
+//! Units: as the names say.
+//! Reference: specification `formats.md`, "Rig log".
 
-use crate::log::head::{check, event, misread};
-use crate::log::lines::Lines;
-use crate::log::{FORMAT, Log, MODELLED, Place, ReadError, short};
-use std::io::BufRead;
+use crate::log::{MODELLED, Place, ReadError};
 
 /// Longest name of a column, characters.
 const LONGEST_NAME: usize = 200;
 
-pub(super) fn read_head<R: BufRead>(format: &str, lines: &mut Lines<'_, R>, log: &mut Log) -> Result<Vec<String>, ReadError> {
-    let mut format_seen = false;
-    loop {
-        let Some(line) = lines.next_line()? else {
-            return Err(lines.place().refuse(
-                None,
-                "the file is empty or ends before its header",
-                format!("'# {format}' and a header line that starts with t_s"),
-            ));
-        };
-        let place = lines.place();
-        if let Some(comment) = line.strip_prefix('#') {
-            let comment = comment.trim();
-            if !format_seen {
-                if comment != format {
-                    let found = format!("'{}'", short(&line));
-                    return Err(match comment {
-                        crate::log::flight_log::FORMAT => place.refuse(
-                            None,
-                            found,
-                            format!("'# {format}' on the first line (a flight: `quadrig close-loop` takes it)"),
-                        ),
-                        _ => place.refuse(
-                            None,
-                            found,
-                            format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
-                        ),
-                    });
-                }
-                format_seen = true;
-            } else if let Some(event) = event(comment) {
-                log.events.push(event);
-            } else if let Ok(table) = comment.parse::<toml::Table>() {
-                if let Some(key) = table.keys().find(|key| log.meta.contains_key(*key)) {
-                    return Err(place.refuse(
-                        Some(key),
-                        "it stands twice in the head",
-                        "each key once: which of the two is right?",
-                    ));
-                }
-                if format == FORMAT {
-                    check(&table, &place)?;
-                }
-                log.meta.extend(table);
-            } else if let Some((key, value)) = misread(comment) {
-                let expected = format!("a value in TOML, a text in quotes: {key} = \"{}\"", value.trim_matches(['"', '\'']));
-                return Err(place.refuse(Some(key), short(value), expected));
-            }
-            continue;
-        }
-        if line.trim().is_empty() {
-            continue;
-        }
-        if !format_seen {
-            return Err(place.refuse(
-                None,
-                "no format line",
-                format!("'# {format}' on the first line (use `quadrig import` for other formats)"),
-            ));
-        }
-        return check_header(&line, &place);
-    }
-}
-
-fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError> {
+/// The names of a header, the time first, each of them one that the contract may read.
+pub(super) fn check_header(line: &str, place: &Place<'_>) -> Result<Vec<String>, ReadError> {
     let names: Vec<String> = line.split(',').map(|n| n.trim().to_owned()).collect();
     if names.first().map(String::as_str) != Some("t_s") {
         if let Some((_, word)) = [(';', "semicolons"), ('\t', "tabs")].iter().find(|(c, _)| names.len() == 1 && line.contains(*c))
